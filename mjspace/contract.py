@@ -1,0 +1,74 @@
+"""What passes between a vehicle, its sensors, a reference and a control law."""
+
+from dataclasses import MISSING, field
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Measurement(NamedTuple):
+    """What the sensors report at a control instant; a leading vehicle axis may precede each shape.
+
+    A vehicle without wheels has ``wheel_speed`` of shape ``(0,)``.
+    """
+
+    attitude: Array
+    """Quaternion, scalar first, body to inertial, shape (..., 4)."""
+    rate: Array
+    """Angular velocity relative to inertial, body axes [rad/s], shape (..., 3)."""
+    wheel_speed: Array
+    """Wheel speeds relative to the bus [rad/s], shape (..., n)."""
+
+
+class Reference(NamedTuple):
+    """The wanted motion at a control instant, the same for every vehicle of a batch."""
+
+    attitude: Array
+    """Quaternion, scalar first, desired body axes to inertial, shape (..., 4)."""
+    rate: Array
+    """Angular velocity of the desired axes, in the desired axes [rad/s], shape (..., 3)."""
+    acceleration: Array
+    """Time derivative of the components of ``rate`` [rad/s^2], shape (..., 3)."""
+
+
+class Law(Protocol):
+    """A control law: gains in, two pure functions, no hidden state.
+
+    ``state``, ``command`` and ``signals`` are named tuples of float64 arrays whose leading axes are
+    those of the measurement; they are logged under their field names, so their shapes never change
+    during a flight. A command for reaction wheels has a field ``torque``: the torque on the bus
+    [N m], body axes, shape (..., 3).
+    """
+
+    def reset(self, measurement: Measurement, reference: Reference) -> Any:
+        """Return the law's state at the start of a flight."""
+
+    def step(
+        self, state: Any, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[Any, Any, Any]:
+        """Return (state, command, signals) for the control period that starts at ``time`` [s]."""
+
+
+class ReferenceSource(Protocol):
+    """A wanted motion as a pure function of time."""
+
+    def at(self, time: Array) -> Reference:
+        """Return the reference at each ``time`` [s], shape (n,), as arrays with n rows."""
+
+
+def gain(unit: str = "", shape: tuple[int | None, ...] = (), default: Any = MISSING) -> Any:
+    """Declare a law's or a reference's parameter: its SI unit and array shape (None: any length).
+
+    The scenario's loader checks the table against both. A gain without a default that is named
+    like one of the plant's properties (``inertia``, ``wheel_axes``, ``wheel_inertia``) or
+    ``control_period`` may be left out of the table: it is then taken from the vehicle as flown.
+    """
+    metadata = {"unit": unit, "shape": shape}
+    if default is MISSING:
+        return field(metadata=metadata)
+    if shape:
+        return field(metadata=metadata, default_factory=lambda: np.array(default, dtype=float))
+    return field(metadata=metadata, default=default)

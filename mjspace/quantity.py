@@ -1,0 +1,75 @@
+"""Numbers with units: what a scenario writes as ``"0.1 deg"`` becomes SI once, when it is read."""
+
+import math
+from typing import Any
+
+_DEG = math.pi / 180.0
+_RPM = 2.0 * math.pi / 60.0
+
+# unit as written -> (SI unit, factor)
+UNITS: dict[str, tuple[str, float]] = {
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
+    "min": ("s", 60.0),
+    "h": ("s", 3600.0),
+    "Hz": ("Hz", 1.0),
+    "kHz": ("Hz", 1e3),
+    "rad": ("rad", 1.0),
+    "mrad": ("rad", 1e-3),
+    "urad": ("rad", 1e-6),
+    "deg": ("rad", _DEG),
+    "arcmin": ("rad", _DEG / 60.0),
+    "arcsec": ("rad", _DEG / 3600.0),
+    "rad/s": ("rad/s", 1.0),
+    "deg/s": ("rad/s", _DEG),
+    "deg/h": ("rad/s", _DEG / 3600.0),
+    "rpm": ("rad/s", _RPM),
+    "rad/s^2": ("rad/s^2", 1.0),
+    "deg/s^2": ("rad/s^2", _DEG),
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+    "km": ("m", 1e3),
+    "m/s": ("m/s", 1.0),
+    "km/s": ("m/s", 1e3),
+    "kg": ("kg", 1.0),
+    "g": ("kg", 1e-3),
+    "kg m": ("kg m", 1.0),
+    "g mm": ("kg m", 1e-6),
+    "kg m^2": ("kg m^2", 1.0),
+    "g mm^2": ("kg m^2", 1e-9),
+    "N": ("N", 1.0),
+    "N m": ("N m", 1.0),
+    "mN m": ("N m", 1e-3),
+    "uN m": ("N m", 1e-6),
+    "N m s": ("N m s", 1.0),
+    "N m s/rad": ("N m s/rad", 1.0),
+    "J": ("J", 1.0),
+}
+
+
+def to_si(value: Any, unit: str) -> Any:
+    """Return ``value`` with every quantity string in it converted to the SI unit ``unit``.
+
+    A number is taken as SI; a string is a number and a unit of the same dimension, ``"30 deg/s"``;
+    lists are converted element by element and anything else is returned as it is.
+
+    Raises:
+        ValueError: the string is no number with a unit, or the unit measures something else.
+    """
+    if isinstance(value, list | tuple):
+        return [to_si(item, unit) for item in value]
+    if not isinstance(value, str):
+        return value
+    number, _, written = value.strip().partition(" ")
+    try:
+        magnitude = float(number)
+    except ValueError:
+        raise ValueError(f"{value!r} is not a quantity: write a number in {unit or 'SI'}") from None
+    written = " ".join(written.split())
+    if not written:
+        return magnitude
+    if written not in UNITS or UNITS[written][0] != unit:
+        right = ", ".join(name for name, (si, _) in UNITS.items() if si == unit)
+        raise ValueError(f"{value!r} has the unit {written!r}: wanted {right or 'a plain number'}")
+    return magnitude * UNITS[written][1]
