@@ -61,15 +61,30 @@ def to_si(value: Any, unit: str) -> Any:
         return [to_si(item, unit) for item in value]
     if not isinstance(value, str):
         return value
-    number, _, written = value.strip().partition(" ")
-    try:
-        magnitude = float(number)
-    except ValueError:
-        raise ValueError(f"{value!r} is not a quantity: write a number in {unit or 'SI'}") from None
-    written = " ".join(written.split())
+    magnitude, written = _split(value)
     if not written:
         return magnitude
     if written not in UNITS or UNITS[written][0] != unit:
         right = ", ".join(name for name, (si, _) in UNITS.items() if si == unit)
         raise ValueError(f"{value!r} has the unit {written!r}: wanted {right or 'a plain number'}")
     return magnitude * UNITS[written][1]
+
+
+def any_to_si(value: str) -> float:
+    """Return the quantity ``value`` in the SI unit of whatever it measures.
+
+    Raises:
+        ValueError: no number, or an unknown unit.
+    """
+    magnitude, written = _split(value)
+    if written and written not in UNITS:
+        raise ValueError(f"{value!r} has the unknown unit {written!r}: have {', '.join(UNITS)}")
+    return magnitude * UNITS[written][1] if written else magnitude
+
+
+def _split(value: str) -> tuple[float, str]:
+    number, _, written = value.strip().partition(" ")
+    try:
+        return float(number), " ".join(written.split())
+    except ValueError:
+        raise ValueError(f"{value!r} is no quantity: write a number and a unit") from None

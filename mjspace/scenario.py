@@ -3,61 +3,28 @@
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from mjspace.quantity import to_si
-
-SI_UNIT = "si_unit"
-
-
-class _Si:
-    """Converts quantity strings to one SI unit; the unit also goes into the scenario reference."""
-
-    def __init__(self, unit: str) -> None:
-        self.unit = unit
-
-    def __call__(self, value: Any) -> Any:
-        return to_si(value, self.unit)
-
-
-def _number(unit: str, **bounds: Any) -> Any:
-    extra = {SI_UNIT: unit}
-    return Annotated[
-        float, BeforeValidator(_Si(unit)), Field(json_schema_extra=extra, allow_inf_nan=False, **bounds)
-    ]
-
-
-def _vector(unit: str, length: int) -> Any:
-    extra = {SI_UNIT: unit}
-    return Annotated[
-        list[Annotated[float, Field(allow_inf_nan=False)]],
-        BeforeValidator(_Si(unit)),
-        Field(min_length=length, max_length=length, json_schema_extra=extra),
-    ]
-
-
-Seconds = _number("s", gt=0)
-Delay = _number("s", ge=0)
-Time = _number("s", ge=0)
-Hertz = _number("Hz", gt=0)
-Mass = _number("kg", gt=0)
-Inertia = _number("kg m^2", gt=0)
-Unit3 = _vector("", 3)
-Meters3 = _vector("m", 3)
-Velocity3 = _vector("m/s", 3)
-Rate3 = _vector("rad/s", 3)
-Angles3 = _vector("rad", 3)
-Torque3 = _vector("N m", 3)
-Force3 = _vector("N", 3)
-Momentum3 = _vector("N m s", 3)
-Quaternion = _vector("", 4)
-Matrix3 = Annotated[list[_vector("kg m^2", 3)], Field(min_length=3, max_length=3)]
-
-
-class Table(BaseModel):
-    """A TOML table: frozen, and with no key that is not listed."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False, use_attribute_docstrings=True)
+from mjspace.fields import (
+    Angle,
+    Angles3,
+    Finite,
+    Matrix3,
+    Meters3,
+    Momentum3,
+    NonNegative,
+    Positive,
+    Quaternion,
+    Rate3,
+    Seconds,
+    Si,
+    Table,
+    Time,
+    Torque3,
+    Unit3,
+    Velocity3,
+)
+from mjspace.quantity import any_to_si
 
 
 class Rates(Table):
@@ -77,24 +44,24 @@ class Wheels(Table):
     axes: Annotated[list[Unit3], Field(min_length=1)] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     """Spin axes in body axes, one row for each wheel; normalized."""
     positions: list[Meters3] | None = None
-    """Rotor centres in the body [m]; the centre of mass when left out (drawn out on the spin axis)."""
-    inertia: Inertia = 0.05
+    """Rotor centres in the body [m]; the centre of mass when left out."""
+    inertia: Annotated[Positive, Si("kg m^2")] = 0.05
     """Axial rotor inertia."""
-    transverse_inertia: Inertia | None = None
+    transverse_inertia: Annotated[Positive, Si("kg m^2")] | None = None
     """Transverse rotor inertia; half the axial when left out."""
-    mass: Mass = 2.0
+    mass: Annotated[Positive, Si("kg")] = 2.0
     """Rotor mass."""
-    torque_limit: _number("N m", gt=0) | None = None  # type: ignore[valid-type]
+    torque_limit: Annotated[Positive, Si("N m")] | None = None
     """Largest motor torque; none when left out."""
-    speed_limit: _number("rad/s", gt=0) | None = None  # type: ignore[valid-type]
+    speed_limit: Annotated[Positive, Si("rad/s")] | None = None
     """Largest speed relative to the bus; at it the motor gives no torque that would raise it."""
-    viscous_friction: _number("N m s/rad", ge=0) = 0.0  # type: ignore[valid-type]
+    viscous_friction: Annotated[NonNegative, Si("N m s/rad")] = 0.0
     """Bearing torque for each rad/s."""
-    coulomb_friction: _number("N m", ge=0) = 0.0  # type: ignore[valid-type]
+    coulomb_friction: Annotated[NonNegative, Si("N m")] = 0.0
     """Bearing torque at any speed, smoothed through zero: c tanh(speed / 0.1 rad/s)."""
-    static_imbalance: _number("kg m", ge=0) = 0.0  # type: ignore[valid-type]
+    static_imbalance: Annotated[NonNegative, Si("kg m")] = 0.0
     """Rotor mass times its centre's offset from the spin axis."""
-    dynamic_imbalance: _number("kg m^2", ge=0) = 0.0  # type: ignore[valid-type]
+    dynamic_imbalance: Annotated[NonNegative, Si("kg m^2")] = 0.0
     """Product of inertia between the spin axis and a transverse one."""
 
     @model_validator(mode="after")
@@ -103,7 +70,7 @@ class Wheels(Table):
             raise ValueError("axes: a spin axis has no direction")
         if self.positions is not None and len(self.positions) != len(self.axes):
             raise ValueError(
-                f"positions: {len(self.positions)} rows for {len(self.axes)} axes: give one for each"
+                f"positions: {len(self.positions)} rows for {len(self.axes)} axes: give as many"
             )
         return self
 
@@ -113,7 +80,7 @@ class PlantTable(Table):
 
     model: str = "satellite_3rw"
     """Name of a folder in assets/."""
-    mass: Mass = 100.0
+    mass: Annotated[Positive, Si("kg")] = 100.0
     """Mass of the bus alone."""
     bus_inertia: Matrix3 | None = None
     """Inertia of the bus alone about its centre of mass, body axes; any symmetric positive-definite
@@ -152,11 +119,11 @@ class Initial(Table):
     """Of the bus, inertial axes; in the free-fall frame when there is an orbit."""
     velocity: Velocity3 = [0.0, 0.0, 0.0]
     """Of the bus, inertial axes."""
-    wheel_speed: Annotated[list[_number("rad/s")], Field()] | None = None  # type: ignore[misc]
+    wheel_speed: Annotated[list[Finite], Si("rad/s")] | None = None
     """Wheel speeds relative to the bus; zero when left out."""
     momentum: Momentum3 | None = None
-    """Or the wanted total angular momentum about the centre of mass, inertial axes: the wheel speeds
-    follow (the smallest, where more than three wheels can make it)."""
+    """Or the wanted total angular momentum about the centre of mass, inertial axes: the wheel
+    speeds follow (the smallest, where more than three wheels can make it)."""
 
     @model_validator(mode="after")
     def _one_of_each(self) -> "Initial":
@@ -174,17 +141,17 @@ class Orbit(Table):
 
     body: Literal["earth", "moon"] = "earth"
     """What is orbited."""
-    semi_major_axis: _number("m", gt=0)  # type: ignore[valid-type]
+    semi_major_axis: Annotated[Positive, Si("m")]
     """From the body's centre."""
     eccentricity: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """0 is a circle."""
-    inclination: _number("rad") = 0.0  # type: ignore[valid-type]
+    inclination: Angle = 0.0
     """To the inertial x-y plane."""
-    ascending_node: _number("rad") = 0.0  # type: ignore[valid-type]
+    ascending_node: Angle = 0.0
     """Right ascension of the ascending node."""
-    periapsis: _number("rad") = 0.0  # type: ignore[valid-type]
+    periapsis: Angle = 0.0
     """Argument of periapsis."""
-    true_anomaly: _number("rad") = 0.0  # type: ignore[valid-type]
+    true_anomaly: Angle = 0.0
     """At time zero."""
 
 
@@ -193,7 +160,7 @@ class Sine(Table):
 
     amplitude: Torque3
     """On each axis."""
-    frequency: _number("rad/s", gt=0)  # type: ignore[valid-type]
+    frequency: Annotated[Positive, Si("rad/s")]
     """The same on every axis."""
     phase: Angles3 = [0.0, 0.0, 0.0]
     """On each axis."""
@@ -218,47 +185,52 @@ class Environment(Table):
     """Evaluated at every stage of the integrator."""
     python: str | None = None
     """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
-    inertial axes, torque [N m] in body axes), held over each integration step (first order only)."""
+    inertial axes, torque [N m] in body axes), held over each integration step: first order only."""
 
 
-class Sensor(Table):
-    """Errors of one sensor; the ideal sensor has none."""
+class SensorTiming(Table):
+    """When a sensor samples and when it reports."""
 
-    noise: Any = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Any = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Any = 0.0
-    """Standard deviation of the bias random walk after one second: grows with the square root of
-    time."""
-    quantization: Any = 0.0
-    """Size of the least significant digit."""
     period: Seconds | None = None
-    """Time between samples, a whole number of integration steps; the control period when left out."""
-    delay: Delay = 0.0
+    """Time between samples, a whole number of integration steps; else the control period."""
+    delay: Time = 0.0
     """Age of a sample when it is reported, a whole number of sample periods."""
 
 
-def _sensor(name: str, unit: str, doc: str) -> type[Sensor]:
-    number = _number(unit, ge=0)
-    fields = ("noise", "bias", "bias_walk", "quantization")
-    body: dict[str, Any] = {"__annotations__": dict.fromkeys(fields, number), "__doc__": doc}
-    body |= dict.fromkeys(fields, 0.0) | {"__module__": __name__}
-    return type(name, (Sensor,), body)
+class StarTracker(SensorTiming):
+    """Attitude sensor; its errors are small rotations about the body axes. Ideal by default."""
+
+    noise: Annotated[NonNegative, Si("rad")] = 0.0
+    """Standard deviation of the white noise of each sample, on each axis."""
+    bias: Annotated[NonNegative, Si("rad")] = 0.0
+    """Standard deviation of the constant bias drawn at the start, on each axis."""
+    bias_walk: Annotated[NonNegative, Si("rad")] = 0.0
+    """Standard deviation that the bias's random walk has after one second."""
+    quantization: Annotated[NonNegative, Si("rad")] = 0.0
+    """Size of the least significant digit."""
 
 
-StarTracker = _sensor("StarTracker", "rad", "Attitude sensor; errors are small rotations about body axes.")
-RateSensor = _sensor("RateSensor", "rad/s", "Gyro or tachometer.")
+class RateSensor(SensorTiming):
+    """Gyro or tachometer. Ideal by default."""
+
+    noise: Annotated[NonNegative, Si("rad/s")] = 0.0
+    """Standard deviation of the white noise of each sample, on each axis."""
+    bias: Annotated[NonNegative, Si("rad/s")] = 0.0
+    """Standard deviation of the constant bias drawn at the start, on each axis."""
+    bias_walk: Annotated[NonNegative, Si("rad/s")] = 0.0
+    """Standard deviation that the bias's random walk has after one second."""
+    quantization: Annotated[NonNegative, Si("rad/s")] = 0.0
+    """Size of the least significant digit."""
 
 
 class Sensors(Table):
     """The vehicle's sensors."""
 
-    attitude: StarTracker = StarTracker()  # type: ignore[valid-type]
+    attitude: StarTracker = StarTracker()
     """Star tracker."""
-    rate: RateSensor = RateSensor()  # type: ignore[valid-type]
+    rate: RateSensor = RateSensor()
     """Gyro."""
-    wheel_speed: RateSensor = RateSensor()  # type: ignore[valid-type]
+    wheel_speed: RateSensor = RateSensor()
     """Wheel tachometers."""
 
 
@@ -284,11 +256,11 @@ class Check(Table):
     signal: str
     """``topic.field`` or ``topic.field[i]`` of the log: ``truth.attitude_error``."""
     statistic: Literal["max", "min", "mean", "rms", "final", "drift"] = "max"
-    """Over the window: of the value, or of the norm of a vector; ``drift`` is the largest change from
-    the window's first value."""
-    below: float | str | None = None
+    """Over the window: of the value, or of the norm of a vector; ``drift`` is the largest change
+    from the window's first value."""
+    below: float | None = None
     """The statistic must be less; a number in SI or a quantity."""
-    above: float | str | None = None
+    above: float | None = None
     """The statistic must be greater; a number in SI or a quantity."""
     start: Time = 0.0
     """The window's first instant."""
@@ -298,6 +270,11 @@ class Check(Table):
     """Taken from the signal first, so that the statistic is of an error."""
     relative: bool = False
     """The error is divided by the norm of ``target``."""
+
+    @field_validator("below", "above", mode="before")
+    @classmethod
+    def _quantity(cls, value: Any) -> Any:
+        return any_to_si(value) if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _bounded(self) -> "Check":
@@ -309,7 +286,7 @@ class Check(Table):
 
 
 class Scenario(Table):
-    """One flight, whole: what flies, where, under which law, for how long, and what it must show."""
+    """One flight, whole: what flies, where, under which law, how long, and what it must show."""
 
     name: str = ""
     """The file's name when left out."""
@@ -357,6 +334,7 @@ def whole_number(span: float, unit: float, span_key: str, unit_key: str) -> int:
     if count < 1 or abs(span / unit - count) > 1e-6:
         near = max(count, 1) * unit
         raise ValueError(
-            f"{span_key} {span:g} s is no whole number of {unit_key} {unit:g} s: {near:g} s would be"
+            f"{span_key} {span:g} s is no whole number of {unit_key} {unit:g} s: "
+            f"{near:g} s would be"
         )
     return count
