@@ -1,0 +1,127 @@
+"""Mass properties: a rotor's inertia, and what the wheels leave of the vehicle's for the bus."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.spatial.transform import Rotation
+
+from mjspace.contract import Array
+from mjspace.scenario import PlantTable, Wheels
+
+
+class Inertial(NamedTuple):
+    """Where a body's mass is: MuJoCo's own fields."""
+
+    mass: float
+    """[kg]"""
+    ipos: Array
+    """Centre of mass in the body's axes [m], shape (3,)."""
+    inertia: Array
+    """Principal moments [kg m^2], shape (3,)."""
+    iquat: Array
+    """Principal axes, as a quaternion to the body's axes, scalar first, shape (4,)."""
+
+
+def unit_axes(wheels: Wheels) -> Array:
+    """Return the spin axes as unit vectors, body axes, shape (n, 3)."""
+    axes = np.array(wheels.axes)
+    result: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    return result
+
+
+def rotor(wheels: Wheels) -> Inertial:
+    """Return the mass properties of each rotor, its spin axis along z.
+
+    Static imbalance is an offset of the mass along x. Dynamic imbalance is a tilt of the principal
+    axes about y that gives the wanted product of inertia between z and x; the rotor is still one
+    that can be made.
+
+    Raises:
+        ValueError: no rotor has that transverse inertia, or so large a product of inertia.
+    """
+    axial, transverse = wheels.inertia, transverse_inertia(wheels)
+    if 2.0 * transverse < axial:
+        raise ValueError(
+            f"plant.wheels.transverse_inertia: {transverse:g} kg m^2 is less than half the axial "
+            f"{axial:g} kg m^2: no rotor has that"
+        )
+    most = (axial - transverse) / 2.0  # at a tilt of 45 degrees
+    if wheels.dynamic_imbalance > abs(most):
+        raise ValueError(
+            f"plant.wheels.dynamic_imbalance: {wheels.dynamic_imbalance:g} kg m^2 is more than a "
+            f"tilt of this rotor can give: {abs(most):g} kg m^2"
+        )
+    tilt = np.arcsin(wheels.dynamic_imbalance / most) / 2.0 if wheels.dynamic_imbalance else 0.0
+    return Inertial(
+        wheels.mass,
+        np.array([wheels.static_imbalance / wheels.mass, 0.0, 0.0]),
+        np.array([transverse, transverse, axial]),
+        np.array([np.cos(tilt / 2.0), 0.0, np.sin(tilt / 2.0), 0.0]),
+    )
+
+
+def bus(table: PlantTable, own: Array) -> tuple[Inertial, Array]:
+    """Return the bus that balances the wheels, and the gyrostat inertia H of the whole.
+
+    The bus's mass is shifted so that the vehicle's centre of mass is the body origin. H is the
+    whole vehicle about it less the wheels' axial inertia, body axes, shape (3, 3): H = I_bus
+    + sum Jt (1 - a a^T) + the parallel-axis terms of bus and wheels. ``own`` is the bus inertia
+    [kg m^2] of a table that gives none. Wheel imbalance, which turns, is left out of the balance.
+
+    Raises:
+        ValueError: the wheels take more than ``gyrostat_inertia`` has.
+    """
+    wheels = table.wheels
+    axes = unit_axes(wheels)
+    centres = np.zeros_like(axes) if wheels.positions is None else np.array(wheels.positions)
+    centre = -wheels.mass * centres.sum(axis=0) / table.mass
+    offsets = table.mass * _point(centre) + wheels.mass * np.sum(
+        [_point(c) for c in centres], axis=0
+    )
+    across = transverse_inertia(wheels) * (len(axes) * np.eye(3) - axes.T @ axes)
+    if table.gyrostat_inertia is None:
+        inertia = own if table.bus_inertia is None else np.array(table.bus_inertia)
+        gyrostat = inertia + across + offsets
+    else:
+        gyrostat = np.array(table.gyrostat_inertia)
+        inertia = gyrostat - across - offsets
+        if np.linalg.eigvalsh(inertia)[0] <= 0.0:
+            raise ValueError(_too_much(inertia, gyrostat - offsets, across, wheels))
+    values, principal = np.linalg.eigh(inertia)
+    principal[:, 2] = np.cross(principal[:, 0], principal[:, 1])  # right-handed
+    quaternion = Rotation.from_matrix(principal).as_quat(scalar_first=True)
+    return Inertial(table.mass, centre, values, quaternion), gyrostat
+
+
+def tensor(inertia: Array, iquat: Array) -> Array:
+    """Return the inertia matrix [kg m^2] of principal moments (3,) and axes (4,), shape (3, 3)."""
+    axes = Rotation.from_quat(iquat, scalar_first=True).as_matrix()
+    result: Array = axes @ np.diag(inertia) @ axes.T
+    return result
+
+
+def transverse_inertia(wheels: Wheels) -> float:
+    """Return a rotor's inertia [kg m^2] about any axis through its centre across the spin axis."""
+    return wheels.inertia / 2.0 if wheels.transverse_inertia is None else wheels.transverse_inertia
+
+
+def _point(r: Array) -> Array:
+    """Return the inertia of a unit mass at ``r`` [m] about the origin."""
+    result: Array = np.dot(r, r) * np.eye(3) - np.outer(r, r)
+    return result
+
+
+def _too_much(inertia: Array, room: Array, across: Array, wheels: Wheels) -> str:
+    """Say what is left of ``room``, and the largest wheels that would fit into it."""
+    if np.linalg.eigvalsh(room)[0] <= 0.0:
+        cure = "lighter wheels or ones nearer to the centre of mass would"
+    else:
+        fits = transverse_inertia(wheels) / eigh(across, room, eigvals_only=True)[-1]
+        cure = (
+            f"a wheel inertia below {2.0 * fits:.4g} kg m^2 would"
+            if wheels.transverse_inertia is None
+            else f"a transverse wheel inertia below {fits:.4g} kg m^2 would"
+        )
+    left = np.array2string(np.linalg.eigvalsh(inertia), precision=4)
+    return f"plant.gyrostat_inertia leaves a bus with the eigenvalues {left} kg m^2: {cure} do"

@@ -1,0 +1,231 @@
+"""The vehicle: a scenario's table composed from assets/ into one compiled MuJoCo model.
+
+State rows are MuJoCo's: ``qpos[0:3]`` is the bus's position, ``qpos[3:7]`` its attitude (scalar
+first, body to inertial); ``qvel[0:3]`` is its velocity in INERTIAL axes, ``qvel[3:6]`` its angular
+velocity in BODY axes. The body origin is the vehicle's centre of mass, but for wheel imbalance.
+"""
+
+import gzip
+import warnings
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjspace import guards, mass
+from mjspace.contract import Array
+from mjspace.scenario import Initial, PlantTable, Rates
+
+_ASSETS = Path(str(files("mjspace.assets")))
+_WHEEL_GAP = 0.05  # m, between the hull and the centre of a wheel drawn outside it
+
+
+class UnphysicalInertiaWarning(UserWarning):
+    """The bus flies with an inertia that no mass distribution has."""
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A compiled vehicle and what a law, an actuator and the log need to know of it."""
+
+    model: Any
+    """The ``mujoco.MjModel``."""
+    inertia: Array
+    """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia,
+    body axes [kg m^2], shape (3, 3); wheel imbalance left out."""
+    wheel_axes: Array
+    """Unit spin axes, body axes, shape (n, 3)."""
+    wheel_inertia: Array
+    """Axial inertia of each rotor [kg m^2], shape (n,)."""
+    wheel_qpos: Any
+    """Index of each wheel's angle in ``qpos``, shape (n,)."""
+    wheel_dof: Any
+    """Index of each wheel's speed in ``qvel``, shape (n,)."""
+    torque_limit: float
+    """Largest motor torque [N m]; inf where there is none."""
+    speed_limit: float
+    """Largest wheel speed relative to the bus [rad/s]; inf where there is none."""
+    momentum: slice
+    """In ``sensordata``: total angular momentum about the centre of mass, inertial [N m s]."""
+    kinetic: slice
+    """In ``sensordata``: kinetic energy [J]."""
+    environment: slice
+    """In ``sensordata``: force [N], inertial axes, and torque [N m], body axes, on the bus."""
+
+
+def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
+    """Return the vehicle that ``table`` describes; its state has ``userdata`` numbers of user data.
+
+    Raises:
+        ValueError: an unknown model, wheels that leave no inertia for the bus or that no rotor can
+            be, or what ``guards.check`` refuses.
+
+    Warns:
+        UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown as given.
+    """
+    spec = _load(table.model)
+    spec.option.timestep = rates.physics
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
+    spec.nuserdata = userdata
+
+    wheels = table.wheels
+    axes = mass.unit_axes(wheels)
+    for index in range(len(axes)):
+        _attach_wheel(spec, table, index)
+    body = spec.body("bus")
+    inertial, gyrostat = mass.bus(table, mass.tensor(body.inertia, body.iquat))
+    model = _compile(spec, inertial)
+    guards.check(model, fastest=wheels.speed_limit or 0.0)
+
+    joints = [model.joint(f"wheel_{index}") for index in range(len(axes))]
+    return Vehicle(
+        model=model,
+        inertia=_frozen(gyrostat),
+        wheel_axes=_frozen(axes),
+        wheel_inertia=_frozen(np.full(len(axes), wheels.inertia)),
+        wheel_qpos=_frozen(np.array([joint.qposadr[0] for joint in joints])),
+        wheel_dof=_frozen(np.array([joint.dofadr[0] for joint in joints])),
+        torque_limit=wheels.torque_limit or np.inf,
+        speed_limit=wheels.speed_limit or np.inf,
+        momentum=_sensor(model, "momentum"),
+        kinetic=_sensor(model, "kinetic"),
+        environment=_sensor(model, "environment"),
+    )
+
+
+def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
+    """Return (qpos, qvel), shapes (nq,) and (nv,), of the vehicle at time zero.
+
+    Wheel speeds for a wanted total momentum are solved with MuJoCo's own momentum matrix, so that
+    they hold for wheels anywhere in the bus; where more than three wheels can make it, the least.
+
+    Raises:
+        ValueError: not one speed for each wheel, a speed above the limit, or a momentum that the
+            wheels' axes cannot make.
+    """
+    data = mujoco.MjData(vehicle.model)
+    wheels = vehicle.wheel_dof
+    data.qpos[0:3] = initial.position
+    if initial.attitude is not None:
+        data.qpos[3:7] = np.array(initial.attitude) / np.linalg.norm(initial.attitude)
+    elif initial.euler is not None:
+        mujoco.mju_euler2Quat(data.qpos[3:7], np.array(initial.euler), "XYZ")  # about fixed axes
+    data.qvel[0:3] = initial.velocity
+    data.qvel[3:6] = initial.rate
+    if initial.momentum is not None:
+        data.qvel[wheels] = _speeds_for(vehicle, data, np.array(initial.momentum))
+    elif initial.wheel_speed is not None:
+        if len(initial.wheel_speed) != len(wheels):
+            raise ValueError(
+                f"initial.wheel_speed: {len(initial.wheel_speed)} speeds for {len(wheels)} wheels"
+            )
+        data.qvel[wheels] = initial.wheel_speed
+    fastest = np.abs(data.qvel[wheels]).max()
+    if fastest > vehicle.speed_limit:
+        raise ValueError(
+            f"initial: a wheel starts at {fastest:.6g} rad/s, above plant.wheels.speed_limit "
+            f"{vehicle.speed_limit:g} rad/s: start slower or raise the limit"
+        )
+    return data.qpos.copy(), data.qvel.copy()
+
+
+def to_bytes(model: Any) -> bytes:
+    """Return the compiled model as a gzipped MJB file: equal models give equal bytes."""
+    buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return gzip.compress(buffer.tobytes(), compresslevel=6, mtime=0)
+
+
+def from_bytes(data: bytes) -> Any:
+    """Return the ``mujoco.MjModel`` that ``to_bytes`` wrote."""
+    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": gzip.decompress(data)})
+
+
+def _load(name: str) -> Any:
+    scene = _ASSETS / name / "scene.xml"
+    if not scene.is_file():
+        known = ", ".join(sorted(path.parent.name for path in _ASSETS.glob("*/scene.xml")))
+        raise ValueError(f"plant.model: no model {name!r}: have {known}")
+    return mujoco.MjSpec.from_file(str(scene))
+
+
+def _attach_wheel(spec: Any, table: PlantTable, index: int) -> None:
+    """Bolt wheel ``index`` to the bus, its z axis along the spin axis."""
+    wheels, name = table.wheels, f"wheel_{index}"
+    axis = mass.unit_axes(wheels)[index]
+    part = mujoco.MjSpec.from_file(str(_ASSETS / "parts/reaction_wheel/reaction_wheel.xml"))
+    rotor, joint, motor = part.body("rotor"), part.joint("spin"), part.actuator("motor")
+    rotor.mass, rotor.ipos, rotor.inertia, rotor.iquat = mass.rotor(wheels)
+    joint.damping = [wheels.viscous_friction, 0.0, 0.0]  # linear, quadratic, cubic
+    if wheels.torque_limit is not None:
+        motor.ctrllimited = True
+        motor.ctrlrange = [-wheels.torque_limit, wheels.torque_limit]
+
+    mount = spec.body("bus").add_frame()
+    mujoco.mju_quatZ2Vec(mount.quat, axis)
+    if wheels.positions is not None:
+        mount.pos = wheels.positions[index]
+    else:
+        reach = _exit(spec.geom("bus_hull").size, axis) + _WHEEL_GAP
+        for geom in rotor.geoms:
+            geom.pos[2] += reach
+    spec.attach(part, prefix=f"{name}_", frame=mount)
+    rotor.name = joint.name = motor.name = motor.target = name
+
+
+def _compile(spec: Any, inertial: mass.Inertial) -> Any:
+    body, moments = spec.body("bus"), inertial.inertia
+    body.mass, body.ipos, _, body.iquat = inertial
+    excess = moments[2] - moments[1] - moments[0]
+    # MuJoCo's compiler refuses what is not physical; its dynamics only need it positive.
+    body.inertia = moments if excess <= 0.0 else np.full(3, moments.mean())
+    model = spec.compile()
+    if excess > 0.0:
+        eigenvalues = np.array2string(moments, precision=4)
+        warnings.warn(
+            f"no mass distribution has the bus inertia's eigenvalues {eigenvalues} kg m^2: the "
+            f"largest exceeds the sum of the others by {excess:.4g}; flown as given",
+            UnphysicalInertiaWarning,
+            stacklevel=3,
+        )
+        model.body("bus").inertia = moments
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
+    """Return the wheel speeds [rad/s] for a total ``momentum`` [N m s], inertial axes."""
+    bus = vehicle.model.body("bus").id
+    matrix = np.zeros((3, vehicle.model.nv))
+    mujoco.mj_fwdPosition(vehicle.model, data)
+    mujoco.mj_angmomMat(vehicle.model, data, matrix, bus)
+    by_wheels = matrix[:, vehicle.wheel_dof]
+    wanted = momentum - matrix @ data.qvel
+    speeds: Array = np.linalg.lstsq(by_wheels, wanted, rcond=1e-10)[0]
+    missing = wanted - by_wheels @ speeds
+    if np.linalg.norm(missing) > 1e-9 * np.linalg.norm(wanted):
+        in_body = data.xmat[bus].reshape(3, 3).T @ missing
+        raise ValueError(
+            f"initial.momentum: the wheels' axes cannot make {in_body} N m s of it (body axes): "
+            f"give wheel_speed, or plant.wheels.axes that span it"
+        )
+    return speeds
+
+
+def _exit(half_size: Array, axis: Array) -> float:
+    """Return how far from its centre [m] a ray along ``axis`` leaves a box of that half size."""
+    with np.errstate(divide="ignore"):
+        return float(np.min(half_size / np.abs(axis)))
+
+
+def _sensor(model: Any, name: str) -> slice:
+    sensor = model.sensor(name)
+    return slice(int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))
+
+
+def _frozen(array: Any) -> Any:
+    array.setflags(write=False)
+    return array
