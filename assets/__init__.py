@@ -1,0 +1,1 @@
+"""Spacecraft models in MuJoCo's format: parts, and the vehicles composed of them."""

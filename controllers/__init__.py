@@ -1,0 +1,1 @@
+"""Control laws, allocation and references: flight software, which imports no simulator."""

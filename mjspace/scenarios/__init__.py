@@ -1,0 +1,1 @@
+"""The scenarios that come with mjspace, one TOML file each."""
