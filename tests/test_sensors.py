@@ -1,0 +1,336 @@
+"""Sensors: what their errors look like, when they report, and that all memory is in the state."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mjspace.attitude import conjugate, from_rotation_vector, multiply, to_rotation_vector
+from mjspace.contract import Array, Measurement
+from mjspace.noise import normals
+from mjspace.scenario import Rates, RateSensor, Sensors, StarTracker
+from mjspace.sensors import SensorSuite, State
+
+EVERYTHING: dict[str, Any] = {"noise": 1e-2, "bias": 0.1, "bias_walk": 2e-2, "quantization": 1e-3}
+FIVE_SIGMA = 5.0  # an honest generator fails one such test in 1.7 million
+
+
+def suite(
+    members: Any = (0,), wheels: int = 3, seed: int = 7, rates: Rates | None = None, **sensors: Any
+) -> SensorSuite:
+    tables = {
+        name: StarTracker(**table) if name == "attitude" else RateSensor(**table)
+        for name, table in sensors.items()
+    }
+    return SensorSuite(Sensors(**tables), rates or Rates(), seed, members, wheels)
+
+
+def still(vehicles: int = 1, wheels: int = 3) -> Measurement:
+    """Return the truth of vehicles at rest in the inertial axes."""
+    return Measurement(
+        np.tile([1.0, 0.0, 0.0, 0.0], (vehicles, 1)),
+        np.zeros((vehicles, 3)),
+        np.zeros((vehicles, wheels)),
+    )
+
+
+def moving(step: int, members: Any = (0,)) -> Measurement:
+    """Return the truth of tumbling vehicles, each in its own way."""
+    axis = np.array([[1.0, 0.3 * m, -0.2] for m in members])
+    return Measurement(
+        from_rotation_vector(0.01 * step * axis), np.cos(0.1 * step) * axis, 3.0 * axis + step
+    )
+
+
+def fly(
+    sensors: SensorSuite, truth: Any, steps: range, state: State | None = None
+) -> tuple[list[State], list[Measurement]]:
+    """Return the state before and the measurement at each of ``steps``."""
+    state = sensors.reset(truth(0)) if state is None else state
+    states, seen = [], []
+    for step in steps:
+        states.append(state)
+        state, measurement = sensors.sample(state, step, truth(step))
+        seen.append(Measurement(*(np.copy(part) for part in measurement)))
+    return states, seen
+
+
+def reports(sensors: SensorSuite, name: str, count: int, vehicles: int, wheels: int = 3) -> Array:
+    """Return ``count`` reports of resting vehicles, shape (count, vehicles, width)."""
+    truth = still(vehicles, wheels)
+    return np.stack([getattr(m, name) for m in fly(sensors, lambda _: truth, range(count))[1]])
+
+
+def turn_b(truth: Array, seen: Array) -> Array:
+    return to_rotation_vector(multiply(conjugate(truth), seen))
+
+
+def assert_same_bits(one: Any, other: Any) -> None:
+    for a, b in zip(one, other, strict=True):
+        assert np.asarray(a).tobytes() == np.asarray(b).tobytes()
+
+
+def test_ideal_sensors_report_the_truth_itself() -> None:
+    sensors, truth = suite(), still()
+    state = sensors.reset(truth)
+    assert state == {}
+    assert sensors.ticks == frozenset()
+    assert sensors.sample(state, 0, truth)[1] is truth
+
+    sensors = suite(rate={"noise": 1.0}, wheel_speed={"period": 1e-3})
+    _, seen = sensors.sample(sensors.reset(truth), 0, truth)
+    assert seen.attitude is truth.attitude
+    assert seen.wheel_speed is truth.wheel_speed
+    assert seen.rate is not truth.rate
+
+
+@pytest.mark.parametrize("name", ["attitude", "rate", "wheel_speed"])
+def test_noise_is_white_with_the_given_deviation(name: str) -> None:
+    sigma, count, vehicles = 1e-3, 1500, 8
+    seen = reports(suite(range(vehicles), **{name: {"noise": sigma}}), name, count, vehicles)
+    error = (turn_b(still().attitude, seen) if name == "attitude" else seen) / sigma
+    n = error.size
+    assert abs(error.mean()) < FIVE_SIGMA / np.sqrt(n)
+    assert abs(error.var() - 1.0) < FIVE_SIGMA * np.sqrt(2.0 / n)
+    for lag in (1, 2, 7, 255, 256, 257):  # the last three: across the streams' blocks
+        pairs = error[lag:] * error[:-lag]
+        assert abs(pairs.mean()) < FIVE_SIGMA / np.sqrt(pairs.size)
+
+
+@pytest.mark.parametrize("name", ["attitude", "rate", "wheel_speed"])
+def test_bias_is_constant_and_drawn_for_each_vehicle_and_axis(name: str) -> None:
+    sigma, vehicles = 1e-3, 3000
+    seen = reports(suite(range(vehicles), **{name: {"bias": sigma}}), name, 3, vehicles)
+    error = (turn_b(still().attitude, seen) if name == "attitude" else seen) / sigma
+    assert np.array_equal(error[0], error[2])
+    assert abs(error[0].mean()) < FIVE_SIGMA / np.sqrt(error[0].size)
+    assert abs(error[0].var() - 1.0) < FIVE_SIGMA * np.sqrt(2.0 / error[0].size)
+
+
+def test_star_tracker_errs_about_body_axes() -> None:
+    sensors = suite(attitude={"bias": 1e-2})
+    _, seen = fly(sensors, moving, range(200))
+    errors = np.stack(
+        [turn_b(moving(k).attitude, measurement.attitude) for k, measurement in enumerate(seen)]
+    )
+    # rounding of two products of unit quaternions
+    assert np.abs(errors - errors[0]).max() < 1e-14
+
+
+@pytest.mark.parametrize(("noise", "walk"), [(1e-3, 0.0), (0.0, 1e-3)])
+def test_allan_variance_of_noise_and_of_walk(noise: float, walk: float) -> None:
+    period, count, vehicles = 4e-3, 1024, 64
+    sensors = suite(
+        range(vehicles),
+        rates=Rates(control=period),
+        rate={"noise": noise, "bias_walk": walk},
+    )
+    truth = still(vehicles)
+    seen = [m.rate for m in fly(sensors, lambda _: truth, range(0, 4 * count, 4))[1]]
+    for m in (1, 4, 16, 64):
+        means = np.stack(seen).reshape(count // m, m, -1).mean(axis=1)
+        allan = 0.5 * np.mean(np.diff(means, axis=0) ** 2)
+        # Clusters of m samples. White noise falls as 1/m; a walk, a sum of steps with variance
+        # walk^2 period, grows as m/3 (m large), here exactly.
+        expected = noise**2 / m + walk**2 * period * (2 * m**2 + 1) / (6 * m)
+        # The mean of n squared differences varies by (2/n)(1 + 2 r^2), where r is the correlation
+        # of neighbours: -1/2 for noise, at most 1/4 for a walk.
+        spread = np.sqrt(3.0 / (means.size - means.shape[1]))
+        assert abs(allan / expected - 1.0) < FIVE_SIGMA * spread
+
+
+def test_walk_has_its_deviation_after_one_second_at_any_period() -> None:
+    vehicles, walk = 2000, 0.3
+    for period, steps in ((0.1, 100), (0.25, 250)):
+        sensors = suite(range(vehicles), rate={"bias_walk": walk, "period": period})
+        truth = still(vehicles)
+        _, seen = fly(sensors, lambda _, truth=truth: truth, range(0, 1001, steps))
+        assert not seen[0].rate.any()
+        final = seen[-1].rate / walk
+        assert abs(final.var() - 1.0) < FIVE_SIGMA * np.sqrt(2.0 / final.size)
+
+
+def test_streams_are_independent_of_each_other() -> None:
+    count, noisy = 4000, {"noise": 1.0}
+    quiet = {"noise": 1e-3}
+    sensors = suite((0, 1), attitude=quiet, rate=noisy, wheel_speed=noisy)
+    truth = still(2)
+    _, seen = fly(sensors, lambda _: truth, range(count))
+    columns = np.concatenate(
+        [
+            np.stack([turn_b(truth.attitude, m.attitude) / 1e-3 for m in seen]).reshape(count, -1),
+            np.stack([m.rate for m in seen]).reshape(count, -1),
+            np.stack([m.wheel_speed for m in seen]).reshape(count, -1),
+        ],
+        axis=1,
+    )
+    mixed = columns.T @ columns / count - np.diag(np.mean(columns**2, axis=0))
+    assert np.abs(mixed).max() < FIVE_SIGMA / np.sqrt(count)
+
+    # noise, walk and bias of one sensor; another seed; an index and its neighbour
+    parts = [normals(7, [0], (1, part), 3) for part in range(3)] + [normals(8, [0], (1, 0), 3)]
+    drawn = np.concatenate([[part(j)[0] for j in range(count)] for part in parts], axis=1)
+    mixed = drawn.T @ drawn / count - np.diag(np.mean(drawn**2, axis=0))
+    assert np.abs(mixed).max() < FIVE_SIGMA / np.sqrt(count)
+
+
+def test_normals_do_not_depend_on_what_was_asked_before() -> None:
+    forth, back = normals(3, [4], (0, 1), 2), normals(3, [4], (0, 1), 2)
+    indices = [0, 1, 255, 256, 1000, 10**9]
+    assert_same_bits([forth(j) for j in indices], [back(j) for j in indices[::-1]][::-1])
+    with pytest.raises(ValueError, match="read-only"):
+        forth(0)[:] = 0.0
+
+
+def test_same_seed_same_bits_and_another_seed_others() -> None:
+    tables = {"attitude": EVERYTHING, "rate": EVERYTHING, "wheel_speed": EVERYTHING}
+    one, same, other = (fly(suite(seed=s, **tables), moving, range(5))[1] for s in (1, 1, 2))
+    for a, b, c in zip(one, same, other, strict=True):
+        assert_same_bits(a, b)
+        assert all((x != y).any() for x, y in zip(a, c, strict=True))
+
+
+def test_a_member_measures_the_same_alone_and_in_a_batch() -> None:
+    late = EVERYTHING | {"delay": 4e-3, "period": 2e-3}
+    tables = {"attitude": late, "rate": EVERYTHING, "wheel_speed": late}
+    batch = [11, 5, 9, 3, 21]
+    steps = range(600)  # crosses a block of the streams
+    _, together = fly(suite(batch, **tables), lambda k: moving(k, batch), steps)
+    for row, member in enumerate(batch):
+        _, alone = fly(suite([member], **tables), lambda k, m=member: moving(k, [m]), steps)
+        for one, all_of_them in zip(alone, together, strict=True):
+            assert_same_bits(one, [part[row] for part in all_of_them])
+
+
+@pytest.mark.parametrize("start", [1, 299, 511, 512])
+def test_a_flight_goes_on_from_any_logged_state(start: int) -> None:
+    late = EVERYTHING | {"delay": 6e-3, "period": 2e-3}
+    tables = {"attitude": late, "rate": late, "wheel_speed": EVERYTHING}
+    states, seen = fly(suite(**tables), moving, range(600))
+    logged = {
+        name: np.frombuffer(part.tobytes()).reshape(part.shape)
+        for name, part in states[start].items()
+    }
+    again, seen_again = fly(suite(**tables), moving, range(start, 600), logged)
+    for one, other in zip(seen[start:], seen_again, strict=True):
+        assert_same_bits(one, other)
+    for one, other in zip(states[start:], again, strict=True):
+        assert one.keys() == other.keys()
+        assert_same_bits(one.values(), other.values())
+
+
+def test_state_is_float64_of_constant_shape_and_never_changed() -> None:
+    late = EVERYTHING | {"delay": 2e-3}
+    sensors = suite((0, 1), attitude=late, rate={"noise": 1.0}, wheel_speed=EVERYTHING)
+    states, _ = fly(sensors, lambda k: moving(k, (0, 1)), range(3))
+    shapes = {name: part.shape for name, part in states[0].items()}
+    assert shapes == {
+        "attitude_samples": (2, 3, 4),
+        "attitude_walk": (2, 3),
+        "rate_samples": (2, 1, 3),
+        "wheel_speed_samples": (2, 1, 3),
+        "wheel_speed_walk": (2, 3),
+    }
+    for state in states:
+        assert {name: part.shape for name, part in state.items()} == shapes
+        assert {part.dtype for part in state.values()} == {np.dtype(np.float64)}
+        before = {name: part.copy() for name, part in state.items()}
+        sensors.sample(state, 0, moving(5, (0, 1)))
+        assert_same_bits(state.values(), before.values())
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 7), st.integers(0, 5), st.integers(1, 7))
+def test_a_report_is_the_newest_sample_that_is_old_enough(
+    period: int, delay: int, control: int
+) -> None:
+    rates = Rates(physics=1e-3, control=control * 1e-3)
+    late = {"period": period * 1e-3, "delay": delay * period * 1e-3}
+    sensors = suite(rates=rates, attitude=late, rate=late, wheel_speed=late)
+    if not sensors.ticks:
+        assert delay == 0
+        return
+    assert sensors.ticks == {period}
+    _, seen = fly(sensors, moving, range(60))
+    for step, measurement in enumerate(seen):
+        # Truth is a function of the step, so a report tells which step it shows.
+        shown = max(step // period - delay, 0) * period
+        expected = moving(shown)
+        assert_same_bits([measurement.rate, measurement.wheel_speed], expected[1:])
+        assert np.allclose(measurement.attitude, expected.attitude, rtol=0.0, atol=1e-15)
+
+
+def test_without_a_period_a_sensor_samples_at_the_control_rate() -> None:
+    sensors = suite(rates=Rates(control=5e-3), rate={"noise": 1.0}, attitude={"delay": 0.01})
+    assert sensors.ticks == {5}
+    _, seen = fly(sensors, moving, range(20))
+    changes = [k + 1 for k, (a, b) in enumerate(pairwise(seen)) if (a.rate != b.rate).any()]
+    assert changes == [5, 10, 15]
+    assert sensors.reset(still())["attitude_samples"].shape == (1, 3, 4)
+
+
+def test_rate_is_rounded_to_whole_digits_after_its_noise() -> None:
+    digit = 0.25
+    sensors = suite(rate={"quantization": digit, "noise": 1e-3})
+    truth = still()._replace(rate=np.array([[0.1, 0.13, -7.7]]))
+    _, seen = sensors.sample(sensors.reset(truth), 0, truth)
+    assert seen.rate.tolist() == [[0.0, 0.25, -7.75]]
+
+
+def test_rounding_an_attitude_errs_alike_about_every_axis_in_every_attitude() -> None:
+    digit, vehicles = 1e-3, 5000
+    attitude = np.random.default_rng(1).normal(size=(vehicles, 4))
+    attitude /= np.linalg.norm(attitude, axis=1, keepdims=True)
+    truth = still(vehicles)._replace(attitude=attitude)
+    sensors = suite(range(vehicles), attitude={"quantization": digit})
+    seen = sensors.sample(sensors.reset(truth), 0, truth)[1].attitude
+    error = turn_b(attitude, seen) / digit
+    # Each component of the quaternion errs uniformly within half of its digit: variance 1/12, and
+    # no more than the norm of four halves, 1, about any axis.
+    assert np.all(np.abs(error) < 1.0)
+    assert np.abs(error.var(axis=0) * 12.0 - 1.0).max() < FIVE_SIGMA * np.sqrt(2.0 / vehicles)
+    exact = 0.5 * digit * np.rint(2.0 * attitude / digit)
+    exact /= np.linalg.norm(exact, axis=1, keepdims=True)
+    assert np.abs(seen - exact).max() < 1e-15  # one rounding of numbers below 1
+
+
+def test_a_measured_quaternion_is_of_unit_length_and_of_the_true_sign() -> None:
+    members = range(50)
+    sensors = suite(members, attitude=EVERYTHING)
+    for step in (0, 1, 400, 700):  # past a whole turn, where the true quaternion changes sign
+        truth = moving(step, members)
+        for sign in (1.0, -1.0):
+            signed = truth._replace(attitude=sign * truth.attitude)
+            seen = sensors.sample(sensors.reset(truth), step, signed)[1].attitude
+            assert np.abs(np.linalg.norm(seen, axis=1) - 1.0).max() < 1e-15  # a few roundings
+            assert np.all(np.sum(seen * signed.attitude, axis=1) > 0.9)
+
+
+@pytest.mark.parametrize("wheels", [0, 4])
+def test_any_number_of_wheels_is_read(wheels: int) -> None:
+    sensors = suite((0, 1), wheels=wheels, wheel_speed=EVERYTHING)
+    truth = still(2, wheels)
+    assert sensors.sample(sensors.reset(truth), 0, truth)[1].wheel_speed.shape == (2, wheels)
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"rate": {"period": 2.5e-3}}, r"sensors\.rate\.period 0\.0025 s .* 0\.001 s: 0\.002 s"),
+        (
+            {"rate": {"period": 2e-3, "delay": 5e-3}},
+            r"sensors\.rate\.delay 0\.005 s .* sensors\.rate\.period 0\.002 s: 0\.004 s",
+        ),
+        (
+            {"attitude": {"delay": 4e-4}},
+            r"sensors\.attitude\.delay .* rates\.control 0\.001 s: 0\.001 s",
+        ),
+        ({"attitude": {"quantization": 1.5}}, r"attitude\.quantization 1\.5 rad"),
+    ],
+)
+def test_what_cannot_be_sampled_is_refused(tables: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        suite(**tables)
