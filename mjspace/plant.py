@@ -78,7 +78,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
     body = spec.body("bus")
     inertial, gyrostat = mass.bus(table, mass.tensor(body.inertia, body.iquat))
     model = _compile(spec, inertial)
-    guards.check(model, fastest=wheels.speed_limit or 0.0)
+    guards.check(model)
 
     joints = [model.joint(f"wheel_{index}") for index in range(len(axes))]
     return Vehicle(
@@ -105,6 +105,10 @@ def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
     Raises:
         ValueError: not one speed for each wheel, a speed above the limit, or a momentum that the
             wheels' axes cannot make.
+
+    Warns:
+        guards.ModelWarning: a step too long for imbalanced wheels at the speed limit or, where
+            there is none, at the initial speed.
     """
     data = mujoco.MjData(vehicle.model)
     wheels = vehicle.wheel_dof
@@ -129,6 +133,9 @@ def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
             f"initial: a wheel starts at {fastest:.6g} rad/s, above plant.wheels.speed_limit "
             f"{vehicle.speed_limit:g} rad/s: start slower or raise the limit"
         )
+    guards.check_imbalance(
+        vehicle.model, vehicle.speed_limit if np.isfinite(vehicle.speed_limit) else fastest
+    )
     return data.qpos.copy(), data.qvel.copy()
 
 

@@ -1,0 +1,167 @@
+"""Each guard on a model with its one defect, and on the same model without it."""
+
+import warnings
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjspace import guards
+
+SOUND = """
+<mujoco>
+  <option timestep="{step}" integrator="{integrator}" gravity="{gravity}">
+    <flag contact="{contact}" constraint="{constraint}" autoreset="{autoreset}"/>
+  </option>
+  <worldbody>
+    <body name="bus">
+      {free}
+      <inertial pos="0 0 0" mass="100" diaginertia="15 12 18"/>
+      <geom name="hull" type="box" size="1 1 1"/>
+      <body name="rotor">
+        <joint name="spin" axis="0 0 1" {joint}/>
+        <inertial pos="{offset} 0 0" mass="2" diaginertia="0.025 0.025 0.05" euler="0 {tilt} 0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>{actuator}</actuator>
+</mujoco>
+"""
+DEFAULTS = {
+    "step": "0.001",
+    "integrator": "RK4",
+    "gravity": "0 0 0",
+    "contact": "disable",
+    "constraint": "disable",
+    "autoreset": "disable",
+    "free": '<freejoint name="bus"/>',
+    "joint": "",
+    "offset": "0",
+    "tilt": "0",
+    "actuator": '<motor name="motor" joint="spin"/>',
+}
+SHARE = 1.0 / (1.0 / 0.05 + 1.0 / 18.05)  # kg m^2: what the motor turns, rotor against bus
+
+
+def model(**defect: str) -> Any:
+    return mujoco.MjModel.from_xml_string(SOUND.format(**DEFAULTS | defect))
+
+
+def test_a_sound_model_passes_in_silence() -> None:
+    guards.check(model())
+    guards.check_imbalance(model(), fastest=1e5)
+
+
+@pytest.mark.parametrize(
+    ("defect", "message"),
+    [
+        ({"autoreset": "enable"}, 'set <flag autoreset="disable"/>'),
+        ({"joint": 'armature="0.01"'}, r"joint 'spin' has armature 0\.01: 16\.7% of its momentum"),
+        (
+            {"actuator": '<motor joint="spin" gear="2" armature="0.0025"/>'},
+            r"joint 'spin' has armature 0\.01: 16\.7%",
+        ),
+        ({"gravity": "0 0 -9.81"}, r"gravity is \[ 0\. +0\. +-9\.81\] m/s\^2"),
+        ({"free": '<joint name="bus" type="free" damping="1"/>'}, "'bus' has damping 1: the world"),
+    ],
+)
+def test_defects_are_refused(defect: dict[str, str], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        guards.check(model(**defect))
+
+
+def test_every_defect_is_named_at_once() -> None:
+    with pytest.raises(ValueError, match=r"(?s)automatic reset.*gravity"):
+        guards.check(model(autoreset="enable", gravity="0 0 -1"))
+
+
+@pytest.mark.parametrize(
+    ("defect", "message"),
+    [
+        ({"integrator": "Euler"}, r"integrator is EULER, first order.*RK4"),
+        ({"integrator": "implicitfast"}, "integrator is IMPLICITFAST"),
+        ({"contact": "enable", "constraint": "enable"}, "1 geoms may collide"),
+        ({"joint": 'frictionloss="0.1"'}, "1 friction losses"),
+        ({"joint": 'limited="true" range="-1 1"'}, "1 joint limits"),
+    ],
+)
+def test_doubts_are_warned_of(defect: dict[str, str], message: str) -> None:
+    with pytest.warns(guards.ModelWarning, match=message):
+        guards.check(model(**defect))
+
+
+def test_a_world_with_a_floor_may_have_gravity_and_contacts() -> None:
+    guards.check(
+        model(gravity="0 0 -9.81", contact="enable", constraint="enable", free="", joint="")
+    )
+
+
+@pytest.mark.parametrize(
+    "servo",
+    [
+        {"joint": 'damping="{kv}"', "actuator": ""},
+        {"actuator": '<velocity joint="spin" kv="{kv}"/>'},
+        {"actuator": '<position joint="spin" kp="1e-9" kv="{kv}"/>'},
+        {"actuator": '<motor joint="spin" gear="2" damping="{quarter}"/>'},
+    ],
+)
+def test_servo_bound_is_where_rk4_really_diverges(servo: dict[str, str]) -> None:
+    """RK4 needs dt < 2.78 I / kv: refused just above, flown just below, as MuJoCo itself does."""
+    for factor, stable in ((0.99, True), (1.01, False)):
+        kv = factor * 2.785294 * SHARE / 1e-3  # the real root of RK4's stability polynomial
+        fill = {"kv": repr(kv), "quarter": repr(kv / 4.0)}
+        servoed = model(**{key: text.format(**fill) for key, text in servo.items()})
+        data = mujoco.MjData(servoed)
+        data.qvel[6] = 1.0
+        mujoco.mj_step(servoed, data, 200)
+        assert (abs(data.qvel[6]) < 1.0) == stable
+        if stable:
+            guards.check(servoed)
+        else:
+            with pytest.raises(ValueError, match=r"'spin' has damping.*below 0\.00099 s would do"):
+                guards.check(servoed)
+
+
+@pytest.mark.parametrize(("factor", "stable"), [(0.99, True), (1.01, False)])
+def test_spring_bound_is_where_rk4_really_diverges(factor: float, stable: bool) -> None:
+    """An undamped spring needs dt < 2.83 / sqrt(k/I), the imaginary end of RK4's region."""
+    stiffness = SHARE * (factor / 1e-3) ** 2 * 8.0
+    sprung = model(joint=f'stiffness="{stiffness!r}"')
+    data = mujoco.MjData(sprung)
+    data.qvel[6] = 1.0
+    mujoco.mj_step(sprung, data, 200)
+    assert (abs(data.qvel[6]) < 1.0) == stable
+    if stable:
+        guards.check(sprung)
+    else:
+        with pytest.raises(ValueError, match="'spin' has damping 0, stiffness"):
+            guards.check(sprung)
+
+
+@pytest.mark.parametrize("defect", [{"offset": "1e-6"}, {"tilt": "0.001"}])
+def test_imbalance_needs_ten_steps_a_revolution(defect: dict[str, str]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        guards.check_imbalance(model(**defect), fastest=600.0)  # 10.5 steps
+    # 8.4 steps: (10.5/8.4)^4 times the measured 1.4e-4.
+    with pytest.warns(guards.ModelWarning, match=r"8\.38 steps .* off by 0\.0003 .* 0\.00084 s"):
+        guards.check_imbalance(model(**defect), fastest=750.0)
+
+
+def test_the_wobble_error_is_as_large_as_the_warning_says() -> None:
+    """The figure behind the warning: 10.5 steps a revolution cost 1.4e-4 of the wobble."""
+    imbalanced = model(offset="1e-5")
+    data = mujoco.MjData(imbalanced)
+    speed = 600.0
+    data.qvel[6] = speed
+    # The bus's centre circles the common one at radius m e / M; so its speed is W times that.
+    radius = 2.0 * 1e-5 / 102.0
+    data.qvel[1] = -speed * radius
+    xs = []
+    for _ in range(2000):
+        mujoco.mj_step(imbalanced, data)
+        xs.append(data.qpos[0])
+    amplitude = np.ptp(xs) / 2.0
+    # Measured 1.38e-4 here; the sampling of the circle's extremes adds 1e-6.
+    assert amplitude / radius - 1.0 == pytest.approx(-1.4e-4, rel=0.05)
