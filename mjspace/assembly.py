@@ -1,0 +1,126 @@
+"""From a scenario to everything that flies: vehicle, environment, sensors, actuators, law."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from mjspace import environment, plant
+from mjspace.actuators import ReactionWheels
+from mjspace.components import construct, load_object, source_of
+from mjspace.contract import Array, Law, ReferenceSource
+from mjspace.errors import blamed_on
+from mjspace.one_by_one import OneByOne
+from mjspace.plant import Vehicle
+from mjspace.scenario import Component, Scenario, Wheels
+from mjspace.sensors import SensorSuite
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """What a scenario describes, built: nothing in it changes while it flies."""
+
+    scenario: Scenario
+    """As flown: with every gain of the law and the reference written out."""
+    vehicle: Vehicle
+    userdata: Array
+    """The environment's parameters, one row (nuserdata,)."""
+    wheels: ReactionWheels
+    reference: ReferenceSource
+    law: Law
+    disturbance: Callable[..., tuple[Any, Any]] | None
+    """The user's own Python disturbance."""
+    sources: dict[str, str]
+    """Texts of the files that define the law, the reference and the disturbance, by role."""
+
+    def sensors(self, members: Sequence[int]) -> SensorSuite:
+        """Return the sensors of these members of the campaign, each with its own random streams."""
+        scenario = self.scenario
+        return SensorSuite(
+            scenario.sensors,
+            scenario.rates,
+            scenario.seed,
+            members,
+            wheels=len(self.vehicle.wheel_axes),
+        )
+
+
+def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None) -> Assembly:
+    """Return the scenario's assembly; ``folder`` is where the files that it names are.
+
+    The law's own file is in ``law_folder``, where that is given.
+
+    Raises:
+        InputError: a part cannot be built, with the scenario's key and what would be right.
+    """
+    friction = _friction(scenario.plant.wheels)
+    size = environment.userdata_size(scenario.environment, friction)
+    vehicle = _part("plant", partial(plant.build, userdata=size), scenario.plant, scenario.rates)
+    facts = {
+        "inertia": vehicle.inertia,
+        "wheel_axes": vehicle.wheel_axes,
+        "wheel_inertia": vehicle.wheel_inertia,
+        "control_period": scenario.rates.control,
+    }
+    flown: dict[str, Any] = {}
+    sources = {}
+    law, flown["law"], sources["law"] = _part(
+        "law", _component, scenario.law, facts, law_folder or folder
+    )
+    reference, flown["reference"], sources["reference"] = _part(
+        "reference", _component, scenario.reference, facts, folder
+    )
+    disturbance = None
+    kind = scenario.environment.python
+    if kind is not None:
+        disturbance = _part("environment.python", load_object, kind, folder)
+        sources["disturbance"] = source_of(disturbance)
+        flown["environment"] = scenario.environment.model_copy(
+            update={"python": _in_log("disturbance", kind)}
+        )
+    flown["law"] = flown["law"].model_copy(update={"kind": _in_log("law", scenario.law.kind)})
+    flown["reference"] = flown["reference"].model_copy(
+        update={"kind": _in_log("reference", scenario.reference.kind)}
+    )
+    return Assembly(
+        scenario=scenario.model_copy(update=flown),
+        vehicle=vehicle,
+        userdata=_part(
+            "environment",
+            environment.userdata,
+            vehicle.model,
+            scenario.environment,
+            friction,
+        ),
+        wheels=ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit),
+        reference=reference,
+        law=law if getattr(law, "batched", False) else OneByOne(law),
+        disturbance=disturbance,
+        sources=sources,
+    )
+
+
+def _component(
+    component: Component, facts: dict[str, Any], folder: Path
+) -> tuple[Any, Component, str]:
+    kind = load_object(component.kind, folder)
+    built, flown = construct(component, kind, facts, folder)
+    return built, flown, source_of(kind)
+
+
+def _in_log(role: str, kind: str) -> str:
+    """Return ``kind`` as the log knows it, where a file of one's own is attached as <role>.py."""
+    place, _, name = kind.partition(":")
+    return f"{role}.py:{name}" if place.endswith(".py") else kind
+
+
+def _friction(wheels: Wheels) -> dict[str, float]:
+    if not wheels.coulomb_friction:
+        return {}
+    return {f"wheel_{i}": wheels.coulomb_friction for i in range(len(wheels.axes))}
+
+
+def _part(key: str, build: Callable[..., Any], *arguments: Any) -> Any:
+    with blamed_on(key):
+        return build(*arguments)

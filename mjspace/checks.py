@@ -1,0 +1,128 @@
+"""Judging a flight: each check is a statistic of one logged signal over a window of time."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mjspace.components import nearest
+from mjspace.contract import Array
+from mjspace.errors import InputError, blamed_on
+from mjspace.log_reader import Log
+from mjspace.scenario import Check
+
+Topics = Mapping[str, Mapping[str, tuple[int, ...]]]
+"""The shape of each field of each topic."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A check and what the log showed."""
+
+    check: Check
+    measured: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the measured value keeps its bounds; a value that is no number never does."""
+        below, above = self.check.below, self.check.above
+        return (below is None or self.measured < below) and (above is None or self.measured > above)
+
+    @property
+    def bound(self) -> str:
+        """The bounds as a person reads them."""
+        parts = [
+            f"{sign} {bound:.6g}"
+            for sign, bound in (("<", self.check.below), (">", self.check.above))
+            if bound is not None
+        ]
+        return " and ".join(parts)
+
+    @property
+    def line(self) -> str:
+        """The verdict in one line."""
+        word = "PASS" if self.passed else "FAIL"
+        return f"{word} {self.check.name}: {self.measured:.6g} (wanted {self.bound})"
+
+
+def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
+    """Refuse checks of signals that a log with these topics will not have.
+
+    Raises:
+        InputError: the first of them, with the near names.
+    """
+    for number, check in enumerate(checks):
+        with blamed_on(f"checks.{number}.signal"):
+            topic, field, index = find_signal(topics, check.signal)
+        size = 1 if index is not None else int(np.prod(topics[topic][field]))
+        count = 1 if check.target is None else np.size(check.target)
+        if count not in (1, size):
+            raise InputError(f"checks.{number}.target: {count} numbers, {check.signal} has {size}")
+
+
+def judge(log: Log, checks: Sequence[Check]) -> list[Verdict]:
+    """Return the verdict of each check, from the log alone, one chunk of it in memory at a time.
+
+    Raises:
+        ValueError: a check names a signal that the log does not have.
+    """
+    return [Verdict(check, _measure(log, check)) for check in checks]
+
+
+def find_signal(topics: Topics, signal: str) -> tuple[str, str, int | None]:
+    """Return the topic, field and index that ``signal`` (``truth.rate[0]``) names.
+
+    Raises:
+        ValueError: there is none, with the near names.
+    """
+    match = re.fullmatch(r"/?(\w+)\.(\w+)(?:\[(\d+)\])?", signal)
+    if match is None:
+        raise ValueError(f"signal {signal!r}: write topic.field or topic.field[i]")
+    topic, field, index = "/" + match[1], match[2], match[3]
+    names = [f"{name[1:]}.{f}" for name, fields in topics.items() for f in fields]
+    if field not in topics.get(topic, {}):
+        raise ValueError(f"no signal {signal!r} in the log{nearest(f'{match[1]}.{field}', names)}")
+    size = int(np.prod(topics[topic][field]))
+    if index is not None and int(index) >= size:
+        raise ValueError(f"signal {signal!r}: {topic[1:]}.{field} has {size} components")
+    return topic, field, None if index is None else int(index)
+
+
+def _measure(log: Log, check: Check) -> float:
+    topic, field, index = find_signal(log.topics, check.signal)
+    target = None if check.target is None else np.asarray(check.target, dtype=float)
+    count, total, peak, least, last = 0, 0.0, -np.inf, np.inf, np.nan
+    first: Array | None = None
+    for block in log.blocks(topic, [field], start=check.start, end=check.end):
+        rows = block[field].reshape(len(block["time"]), -1)
+        rows = rows if index is None else rows[:, index : index + 1]
+        if target is not None:
+            rows = rows - target
+        if first is None:
+            first = rows[0]
+        if check.statistic == "drift":
+            rows = rows - first
+        values = rows[:, 0] if rows.shape[1] == 1 else np.linalg.norm(rows, axis=1)
+        if check.statistic in ("drift", "rms") or target is not None:
+            values = np.abs(values)
+        count += len(values)
+        total += float(np.sum(values**2 if check.statistic == "rms" else values))
+        # max and min pass a value that is no number on: it must fail every bound
+        peak, least, last = (
+            float(np.max([peak, values.max()])),
+            float(np.min([least, values.min()])),
+            float(values[-1]),
+        )
+    if count == 0:
+        return float("nan")
+    scale = float(np.linalg.norm(target)) if check.relative and target is not None else 1.0
+    measured = {
+        "max": peak,
+        "drift": peak,
+        "min": least,
+        "mean": total / count,
+        "rms": float(np.sqrt(total / count)),
+        "final": last,
+    }[check.statistic]
+    return measured / scale

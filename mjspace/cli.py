@@ -1,0 +1,281 @@
+"""The command line: ``mjspace list | info | run | replay | render | plot``.
+
+Exit status: 0 all is well, 1 flown but a check failed (or a replay differed, or the flight ended
+early), 2 bad input. Modules are imported when a command needs them: ``--help`` answers at once.
+"""
+
+import json
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from mjspace.flight import Result
+    from mjspace.log_reader import Log
+
+app = typer.Typer(
+    help="Fly control laws on multibody spacecraft in MuJoCo.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Set = Annotated[
+    list[str],
+    typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario; repeatable."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Answer in JSON, for another program.")]
+LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="The MCAP log of a flight.")]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", help="Folder to write; runs/<scenario>/<UTC stamp> when left out."),
+]
+Plot = Annotated[bool, typer.Option("--plot", help="Also plot the log: flight.png.")]
+Video = Annotated[bool, typer.Option("--video", help="Also render the log: flight.mp4.")]
+
+
+def main() -> None:
+    """Run the command line; the entry point."""
+    warnings.showwarning = _warn
+    with _errors():
+        app()
+
+
+@app.command("list")
+def list_scenarios(as_json: Json = False) -> None:
+    """List the scenarios that come with mjspace."""
+    from mjspace.loading import load, scenario_names
+
+    found = {name: load(name)[0].description for name in scenario_names()}
+    if as_json:
+        print(json.dumps(found, indent=2))
+        return
+    width = max(map(len, found))
+    for name, description in found.items():
+        print(f"{name:{width}}  {description}")
+
+
+@app.command()
+def info(
+    target: Annotated[str, typer.Argument(metavar="SCENARIO|LOG")],
+    overrides: Set = [],  # noqa: B006
+    as_json: Json = False,
+) -> None:
+    """Show a scenario with every default written out, or what a log holds."""
+    if target.endswith(".mcap"):
+        from mjspace import report
+
+        log = _open(Path(target))
+        if as_json:
+            print(json.dumps(report.log_data(log), indent=2))
+        else:
+            report.print_log(log)
+        return
+    from mjspace.loading import load, to_toml
+
+    scenario, _ = load(target, overrides)
+    print(scenario.model_dump_json(indent=2) if as_json else to_toml(scenario).rstrip())
+
+
+@app.command()
+def run(
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    overrides: Set = [],  # noqa: B006
+    seed: Annotated[int | None, typer.Option(help="Seed of every random stream.")] = None,
+    out: Out = None,
+    duration: Annotated[str, typer.Option(help="Simulated time: 20, or '2 min'.")] = "",
+    plot_it: Plot = False,
+    video: Video = False,
+    as_json: Json = False,
+) -> None:
+    """Fly a scenario, log it and judge it."""
+    from mjspace.assembly import assemble
+    from mjspace.flight import fly_to_log, output_folder
+    from mjspace.loading import load
+
+    extra = [] if seed is None else [f"seed={seed}"]
+    extra += [f"duration={duration!r}"] if duration else []
+    loaded, folder = load(scenario, [*overrides, *extra])
+    assembly = assemble(loaded, folder)
+    with _progress(loaded.duration, "s", "flying") as progress:
+        path = output_folder(out, loaded.name) / "flight.mcap"
+        result = fly_to_log(assembly, path, progress=progress)
+    _finish(result, plot_it, video, as_json)
+
+
+@app.command()
+def replay(
+    log: LogFile,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Compare with the log bit by bit; write nothing.")
+    ] = False,
+    start: Annotated[
+        float, typer.Option("--from", metavar="T", help="Begin at this logged time [s].")
+    ] = 0.0,
+    law: Annotated[
+        str, typer.Option(help="Fly this law instead: module:Class or file.py:Class.")
+    ] = "",
+    gains: Annotated[
+        list[str], typer.Option("--gain", metavar="KEY=VALUE", help="A gain of --law; repeatable.")
+    ] = [],  # noqa: B006
+    out: Out = None,
+    plot_it: Plot = False,
+    video: Video = False,
+    as_json: Json = False,
+) -> None:
+    """Fly a log again from the log alone: to prove it, or under another law."""
+    from mjspace import replay as again
+    from mjspace.errors import InputError
+    from mjspace.flight import output_folder
+    from mjspace.loading import component
+
+    if gains and not law:
+        raise InputError("--gain: goes with --law")
+    if verify and law:
+        raise InputError("--verify: another law flies another flight: leave --law out")
+    logged = _open(log)
+    with _progress(logged.end, "s", "flying") as progress:
+        if verify:
+            difference = again.verify(log, start=start, progress=progress)
+        else:
+            result = again.replay(
+                log,
+                output_folder(out, f"{logged.metadata['scenario']}-replay"),
+                start=start,
+                law=component(law, gains) if law else None,
+                progress=progress,
+            )
+    if not verify:
+        _finish(result, plot_it, video, as_json)
+    elif as_json:
+        print(json.dumps({"identical": difference is None, "difference": str(difference or "")}))
+    else:
+        print(difference or f"identical: every /state from t = {start:g} s to {logged.end:g} s")
+    raise typer.Exit(1 if verify and difference else 0)
+
+
+@app.command()
+def render(
+    log: LogFile,
+    output: Annotated[Path, typer.Option("-o", "--output", help="x.mp4, or x.png for a still.")],
+    camera: Annotated[str, typer.Option(help="A camera of the model.")] = "chase",
+    size: Annotated[str, typer.Option(metavar="WxH", help="In pixels.")] = "960x540",
+    rate: Annotated[float, typer.Option(help="Frames a second.")] = 30.0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds for each second.")] = 1.0,
+    at: Annotated[float | None, typer.Option(help="Time of a still [s]; else the end.")] = None,
+) -> None:
+    """Render a log to a video or a picture, offscreen."""
+    from mjspace.errors import InputError, blamed_on
+    from mjspace.render import render as to_picture
+
+    width, _, height = size.partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise InputError(f"--size {size}: write width and height in pixels, as in 960x540")
+    with _progress(_open(log).end, "s", "rendering") as progress, blamed_on("render"):
+        to_picture(
+            log,
+            output,
+            camera=camera,
+            size=(int(width), int(height)),
+            rate=rate,
+            speed=speed,
+            at=at,
+            progress=progress,
+        )
+    print(output)
+
+
+@app.command()
+def plot(
+    log: LogFile,
+    output: Annotated[Path, typer.Option("-o", "--output", help="A PNG file.")],
+) -> None:
+    """Plot a log: errors, rates, torques, wheel speeds, the law's signals, disturbances."""
+    from mjspace.errors import blamed_on
+    from mjspace.plot import plot as to_picture
+
+    with blamed_on("plot"):
+        to_picture(log, output)
+    print(output)
+
+
+def _finish(result: "Result", plot_it: bool, video: bool, as_json: bool) -> None:
+    """Print the verdict, make the pictures that were asked for, and exit with the status."""
+    from mjspace import report
+
+    pictures = {}
+    if not as_json:
+        report.print_result(result)
+        print(f"log    {result.path}")
+    if plot_it:
+        from mjspace.plot import plot as to_plot
+
+        pictures["plot"] = result.path.with_suffix(".png")
+        to_plot(result.path, pictures["plot"])
+    if video:
+        from mjspace.render import render as to_video
+
+        pictures["video"] = result.path.with_suffix(".mp4")
+        with _progress(result.log.end, "s", "rendering") as progress:
+            to_video(result.path, pictures["video"], progress=progress)
+    if as_json:
+        shown = {name: str(path) for name, path in pictures.items()}
+        print(json.dumps(report.result_data(result) | shown, indent=2))
+    else:
+        for name, path in pictures.items():
+            print(f"{name:6} {path}")
+    if result.signal:
+        raise typer.Exit(128 + result.signal)
+    raise typer.Exit(0 if result.passed else 1)
+
+
+def _open(path: Path) -> "Log":
+    from mjspace.errors import blamed_on
+    from mjspace.log_reader import Log
+
+    with blamed_on("log"):
+        return Log(path)
+
+
+@contextmanager
+def _progress(total: float, unit: str, doing: str) -> Iterator[Callable[[float], None]]:
+    """Give a function to tell how far it is; a bar is drawn on a terminal after two seconds."""
+    from tqdm import tqdm
+
+    layout = "{desc} {percentage:3.0f}% |{bar}| {n:.1f}/{total:.1f} {unit} [{elapsed}<{remaining}]"
+    with tqdm(
+        total=total, desc=doing, unit=unit, delay=2, disable=None, leave=False, bar_format=layout
+    ) as bar:
+        yield lambda reached: bar.update(reached - bar.n) and None
+
+
+@contextmanager
+def _errors() -> Iterator[None]:
+    """Turn what a user can mend into one line and an exit status; anything else is a bug."""
+    try:
+        yield
+    except Exception as error:
+        status = _status(error)
+        if status is None:
+            raise
+        print(f"mjspace: {error}", file=sys.stderr)
+        sys.exit(status)
+
+
+def _status(error: Exception) -> int | None:
+    from mjspace.errors import FlightError, InputError, NoRendererError
+
+    if isinstance(error, InputError):
+        return 2
+    if isinstance(error, FlightError | NoRendererError | OSError):
+        return 1
+    return None
+
+
+def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
+    print(f"mjspace: warning: {message}", file=sys.stderr)

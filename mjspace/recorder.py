@@ -1,0 +1,110 @@
+"""A flight's log: what is attached, which units, and blocks of periods as they come."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import mujoco
+import numpy as np
+
+from mjspace import foxglove_layout, plant, provenance
+from mjspace.assembly import Assembly
+from mjspace.geometry import scene
+from mjspace.loading import to_toml
+from mjspace.log_writer import LogWriter
+from mjspace.tape import Block, one_vehicle, shapes
+
+FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
+
+UNITS = {
+    "/truth": {
+        "rate": "rad/s",
+        "wheel_speed": "rad/s",
+        "position": "m",
+        "velocity": "m/s",
+        "momentum": "N m s",
+        "energy": "J",
+        "attitude_error": "rad",
+    },
+    "/measurement": {"rate": "rad/s", "wheel_speed": "rad/s"},
+    "/reference": {"rate": "rad/s", "acceleration": "rad/s^2"},
+    "/command": {"torque": "N m", "wheel_torque": "N m"},
+    "/disturbance": {"force": "N", "torque": "N m"},
+}
+
+
+class Recorder:
+    """The open log of one vehicle's flight; a context manager."""
+
+    def __init__(self, assembly: Assembly, path: Path, member: int, first: Block) -> None:
+        """Create the log at ``path``; ``first`` is the flight's first block, for its shapes.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        model = assembly.vehicle.model
+        compiled = plant.to_bytes(model)
+        attachments = {
+            "model.mjb": ("application/octet-stream", compiled),
+            "scenario.toml": ("application/toml", to_toml(assembly.scenario).encode()),
+            "foxglove_layout.json": ("application/json", foxglove_layout.layout()),
+        }
+        for role, text in assembly.sources.items():
+            attachments[f"{role}.py"] = ("text/x-python", text.encode())
+        self._log = LogWriter(
+            path,
+            shapes(first),
+            provenance.metadata(assembly.scenario, compiled, member),
+            attachments,
+            scene(model),
+            UNITS,
+        )
+        self._model, self._data = model, mujoco.MjData(model)
+        self._stride = max(1, round(FRAME_PERIOD / assembly.scenario.rates.control))
+        self.time = 0.0
+        """Of the last period written [s]."""
+
+    def write(self, block: Block) -> None:
+        """Log a block of a flight of one vehicle.
+
+        Raises:
+            OSError: the log cannot be written any more.
+        """
+        rows = one_vehicle(block)
+        # What goes into a chunk beside the periods must be handed over before them.
+        self._write_frames(block, rows["/state"]["physics"])
+        for time, _, text in block.events:
+            self._log.event(time, "WARNING", text)
+        self._log.write(block.time, rows)
+        self.time = float(block.time[-1])
+
+    def event(self, level: str, text: str) -> None:
+        """Log ``text`` at the flight's present time; ``level`` is INFO, WARNING or ERROR."""
+        self._log.event(self.time, level, text)
+
+    def flush(self) -> None:
+        """Wait until everything given so far can be read from the file."""
+        self._log.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._log.__exit__(kind, error, trace)
+
+    def _write_frames(self, block: Block, physics: np.ndarray) -> None:
+        due = np.flatnonzero((block.period + np.arange(len(block.time))) % self._stride == 0)
+        positions = np.empty((len(due), self._model.nbody - 1, 3))
+        quaternions = np.empty((len(due), self._model.nbody - 1, 4))
+        for i, k in enumerate(due):
+            mujoco.mj_setState(
+                self._model, self._data, physics[k], mujoco.mjtState.mjSTATE_INTEGRATION
+            )
+            mujoco.mj_kinematics(self._model, self._data)
+            positions[i], quaternions[i] = self._data.xpos[1:], self._data.xquat[1:]
+        self._log.write_transforms(block.time[due], positions, quaternions)

@@ -1,0 +1,169 @@
+"""Flying again from a log alone: to prove it bit for bit, or to see what another law would do."""
+
+import dataclasses
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjspace import plant
+from mjspace.assembly import Assembly, assemble
+from mjspace.contract import Measurement, Reference
+from mjspace.errors import InputError, blamed_on
+from mjspace.flight import Progress, Result, fly_to_log
+from mjspace.loading import validate
+from mjspace.log_reader import Log
+from mjspace.scenario import Component
+from mjspace.simulation import Start, fly
+from mjspace.tape import one_vehicle
+
+SOURCES = ("law", "reference", "disturbance")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where a repeated flight first differs from its log."""
+
+    time: float
+    field: str
+    index: int
+    logged: float
+    flown: float
+
+    def __str__(self) -> str:
+        """Return it as one line."""
+        return (
+            f"/state.{self.field}[{self.index}] differs first at t = {self.time:.6g} s: "
+            f"logged {self.logged!r}, flown {self.flown!r}"
+        )
+
+
+def replay(
+    log_path: str | Path,
+    out: str | Path,
+    *,
+    start: float = 0.0,
+    law: Component | None = None,
+    folder: Path = Path(),
+    progress: Progress = lambda time: None,
+) -> Result:
+    """Fly a log again from time ``start`` [s] into a new log, ``flight.mcap`` in ``out``.
+
+    Under another ``law``, whose files are looked up from ``folder``, its state begins at ``start``.
+
+    Raises:
+        InputError: no such log, time or law.
+        OSError: the new log cannot be written.
+    """
+    with blamed_on("log"):
+        log = Log(log_path)
+    with assembly_of(log, law, folder) as assembly:
+        begin = start_of(log, assembly, start, fresh_law=law is not None)
+        member = int(log.metadata["member"])
+        return fly_to_log(
+            assembly, Path(out) / "flight.mcap", member=member, start=begin, progress=progress
+        )
+
+
+def verify(
+    log_path: str | Path, *, start: float = 0.0, progress: Progress = lambda time: None
+) -> Difference | None:
+    """Fly a log again from ``start`` [s]; return where ``/state`` first differs, None if nowhere.
+
+    Raises:
+        InputError: no such log or time.
+        FlightError: the repeated flight cannot go on where the logged one could.
+    """
+    with blamed_on("log"):
+        log = Log(log_path)
+    with assembly_of(log) as assembly:
+        begin = start_of(log, assembly, start)
+        for block in fly(assembly, begin, [int(log.metadata["member"])]):
+            rows = one_vehicle(block)["/state"]
+            logged = log.read("/state", start=block.time[0], end=block.time[-1])
+            found = _first_difference(logged, rows)
+            if found is not None:
+                return found
+            progress(float(block.time[-1]))
+            if len(logged["time"]) < len(block.time):
+                break  # the log ends here: its flight was interrupted
+    return None
+
+
+@contextmanager
+def assembly_of(
+    log: Log, law: Component | None = None, folder: Path = Path()
+) -> Iterator[Assembly]:
+    """Give what flew in ``log``, or the same under another ``law``.
+
+    The scenario, the compiled model and the files of one's own all come from the log.
+
+    Raises:
+        InputError: the log lacks one of them, or the law cannot be built.
+    """
+    table = tomllib.loads(log.attachment("scenario.toml").decode())
+    scenario = validate(table, "the log's scenario")
+    if law is not None:
+        scenario = scenario.model_copy(update={"law": law})
+    with tempfile.TemporaryDirectory() as own:
+        for role in SOURCES:
+            if f"{role}.py" in log.attachments:
+                (Path(own) / f"{role}.py").write_bytes(log.attachment(f"{role}.py"))
+        assembly = assemble(scenario, Path(own), law_folder=None if law is None else folder)
+        vehicle = plant.describe(plant.from_bytes(log.attachment("model.mjb")), scenario.plant)
+        yield dataclasses.replace(assembly, vehicle=vehicle)
+
+
+def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = False) -> Start:
+    """Return the logged period nearest ``time`` [s] as a start; ``fresh_law`` resets the law there.
+
+    Raises:
+        InputError: the log does not hold that time, or not this law's state.
+    """
+    period = assembly.scenario.rates.control
+    number = round(time / period)
+    near = {"start": (number - 0.5) * period, "end": (number + 0.5) * period}
+    row = log.read("/state", **near)
+    if len(row["time"]) != 1:
+        raise InputError(f"t = {time:g} s is not in the log: it has {log.start:g} to {log.end:g} s")
+    state = {name: values for name, values in row.items() if name != "time"}
+    sensors = {n.removeprefix("sensor_"): v for n, v in state.items() if n.startswith("sensor_")}
+    law_state: Any = None
+    if not fresh_law:
+        seen, wanted = log.read("/measurement", **near), log.read("/reference", **near)
+        template = assembly.law.reset(
+            Measurement(*(seen[name] for name in Measurement._fields)),
+            Reference(*(wanted[name][0] for name in Reference._fields)),
+        )
+        names = getattr(template, "_fields", ())
+        missing = [name for name in names if f"law_{name}" not in state]
+        if missing:
+            raise InputError(f"the log has no state {missing[0]!r} for this law: another flew")
+        law_state = type(template)(*(state[f"law_{name}"] for name in names)) if names else ()
+    return Start(number, state["physics"], sensors, law_state)
+
+
+def _first_difference(logged: dict[str, Any], flown: dict[str, Any]) -> Difference | None:
+    found: tuple[int, str, int] | None = None
+    n = len(logged["time"])
+    for name, rows in flown.items():
+        a = np.ascontiguousarray(logged[name]).reshape(n, -1)
+        b = np.ascontiguousarray(rows[:n]).reshape(n, -1)
+        places = np.argwhere(a.view(np.uint64) != b.view(np.uint64))
+        if len(places) and (found is None or places[0][0] < found[0]):
+            found = (int(places[0][0]), name, int(places[0][1]))
+    if found is None:
+        return None
+    k, name, i = found
+    return Difference(
+        float(logged["time"][k]),
+        name,
+        i,
+        float(logged[name].reshape(n, -1)[k, i]),
+        float(flown[name][:n].reshape(n, -1)[k, i]),
+    )

@@ -1,0 +1,236 @@
+"""The loop: one control period, repeated, for one vehicle or many, in blocks of logged rows."""
+
+import math
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+
+from mjspace import attitude, environment
+from mjspace.assembly import Assembly
+from mjspace.contract import Array, Measurement, Reference
+from mjspace.errors import FlightError
+from mjspace.plant import initial_state
+from mjspace.scenario import Scenario, whole_number
+from mjspace.tape import Block, Columns, Tape
+
+BLOCK_PERIODS = 500
+BLOCK_SECONDS = 0.4  # of wall time: with the writing of it, less than the second a kill may cost
+INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a flight begins: any period of any flight, with everything that is remembered there."""
+
+    period: int
+    physics: Array
+    """MuJoCo's integration state, (N, nstate)."""
+    sensors: dict[str, Array]
+    """The sensors' state before they sample in this period."""
+    law: Any
+    """The law's state before it steps in this period; None: the law is reset here."""
+
+
+def last_period(scenario: Scenario) -> int:
+    """Return the number of the scenario's last control period."""
+    return math.floor(scenario.duration / scenario.rates.control * (1.0 + 1e-12))
+
+
+def first_start(assembly: Assembly, members: Sequence[int]) -> Start:
+    """Return time zero of the scenario for these members."""
+    model = assembly.vehicle.model
+    data = mujoco.MjData(model)
+    data.qpos, data.qvel = initial_state(assembly.vehicle, assembly.scenario.initial)
+    data.userdata = assembly.userdata
+    row = np.empty(mujoco.mj_stateSize(model, INTEGRATION))
+    mujoco.mj_getState(model, data, row, INTEGRATION)
+    physics = np.repeat(row[None], len(members), axis=0)
+    sensors = assembly.sensors(members).reset(Columns(assembly).truth(physics))
+    return Start(0, physics, sensors, None)
+
+
+def fly(
+    assembly: Assembly,
+    start: Start,
+    members: Sequence[int] = (0,),
+    *,
+    threads: int = 1,
+    stop: Callable[[], bool] = lambda: False,
+) -> Iterator[Block]:
+    """Fly the scenario from ``start`` to its end and yield what happened, block by block.
+
+    A row holds the state at its time, and the measurement, reference and command of that instant;
+    the last row's command is not flown. ``stop`` is asked each period and ends the flight.
+
+    Raises:
+        FlightError: the flight cannot go on; every good period has been yielded before.
+    """
+    flight = _Flight(assembly, start, members, threads)
+    last = last_period(assembly.scenario)
+    saturated = np.zeros((len(members), len(assembly.vehicle.wheel_axes)), dtype=bool)
+    period = start.period
+    while period <= last:
+        tape, trouble = flight.record(period, last, stop)
+        block, problem = _until_trouble(tape.block(assembly, flight.columns, saturated))
+        if len(block.time):
+            yield block
+        if problem or trouble:
+            raise FlightError(problem or trouble)
+        if stop():
+            return
+        saturated = tape.saturated[-1].astype(bool)
+        period += len(tape)
+
+
+class _Flight:
+    """The batch in flight, and what the sensors and the law remember."""
+
+    def __init__(
+        self, assembly: Assembly, start: Start, members: Sequence[int], threads: int
+    ) -> None:
+        scenario = assembly.scenario
+        environment.install()
+        self.assembly = assembly
+        self.columns = Columns(assembly)
+        self.suite = assembly.sensors(members)
+        self.sensors, self.law_state = start.sensors, start.law
+        self.batch = Batch(assembly.vehicle.model, len(members), threads)
+        self.batch.state[:] = start.physics
+        self.ctrl, self.sensordata = self.batch.bind("ctrl"), self.batch.bind("sensordata")
+        self.push = None
+        if assembly.disturbance is not None:
+            self.push = _Push(
+                assembly.disturbance, self.batch, assembly.vehicle.model.body("bus").id
+            )
+        self.steps = whole_number(
+            scenario.rates.control, scenario.rates.physics, "rates.control", "rates.physics"
+        )
+        self.tick = math.gcd(self.steps, *self.suite.ticks)
+
+    def record(self, first: int, last: int, stop: Callable[[], bool]) -> tuple[Tape, str]:
+        """Fly a block of periods and return the tape, and why it cannot go on ('' where it can)."""
+        tape = Tape(first)
+        control = self.assembly.scenario.rates.control
+        end = min(first + BLOCK_PERIODS - 1, last)
+        references = self.assembly.reference.at(np.arange(first, end + 1) * control)
+        due = clock.monotonic() + BLOCK_SECONDS
+        now = first * control
+        try:
+            for period, reference in enumerate(map(Reference, *references), first):
+                now = period * control
+                self._fly_period(tape, period, now, reference, flown=period < last)
+                if stop() or clock.monotonic() > due:
+                    break
+        except (SimulationError, FlightError) as error:
+            return tape, f"stopped at t = {now:.6g} s: {error}"
+        raised = np.flatnonzero(self.batch.warning[:, :, 1].any(axis=0))
+        if len(raised):
+            warning = mujoco.mjtWarning(int(raised[0])).name
+            return tape, f"MuJoCo warned ({warning}) before t = {now:.6g} s"
+        return tape, ""
+
+    def _fly_period(
+        self, tape: Tape, period: int, now: float, reference: Reference, *, flown: bool
+    ) -> None:
+        physics = self.batch.state.copy()
+        truth = self.columns.truth(physics)
+        tape.physics.append(physics)
+        tape.sensors.append(self.sensors)
+        self.sensors, measurement = self.suite.sample(self.sensors, period * self.steps, truth)
+        before, command, signals = self._ask_law(now, measurement, reference)
+        motor, saturated = self.assembly.wheels.motor_torque(command.torque, truth.wheel_speed)
+        self.ctrl[:] = motor
+        if self.push is not None:
+            tape.push.append(self.push(now, truth))
+        # Derived fields lag the state by one substep: the first substep computes those of `now`.
+        if flown:
+            self.batch.step()
+        else:
+            self.batch.forward()
+        tape.law.append(before)
+        tape.measurement.append(measurement)
+        tape.reference.append(reference)
+        tape.command.append(command)
+        tape.wheel_torque.append(motor)
+        tape.saturated.append(saturated)
+        tape.signals.append(signals)
+        tape.sensordata.append(self.sensordata.copy())
+        if flown and self.steps > 1:
+            self._rest_of_period(period * self.steps)
+
+    def _ask_law(
+        self, now: float, measurement: Measurement, reference: Reference
+    ) -> tuple[Any, Any, Any]:
+        """Return the law's state before its step, its command and its signals."""
+        law = self.assembly.law
+        try:
+            if self.law_state is None:
+                self.law_state = law.reset(measurement, reference)
+            before = self.law_state
+            self.law_state, command, signals = law.step(before, now, measurement, reference)
+        except Exception as error:
+            raise FlightError(f"the law raised {type(error).__name__}: {error}") from error
+        return before, command, signals
+
+    def _rest_of_period(self, first_step: int) -> None:
+        """Integrate from the period's first substep to its end, with the samples due in between."""
+        step, physics_step = 1, self.assembly.scenario.rates.physics
+        while step < self.steps:
+            due = step % self.tick == 0
+            if due or self.push is not None:
+                truth = self.columns.truth(self.batch.state.copy())
+                if due:
+                    self.sensors, _ = self.suite.sample(self.sensors, first_step + step, truth)
+                if self.push is not None:
+                    self.push((first_step + step) * physics_step, truth)
+            count = 1 if self.push is not None else self.tick - step % self.tick
+            self.batch.step(nstep=count)
+            step += count
+
+
+class _Push:
+    """The user's own disturbance, held over one integration step as a force on the bus."""
+
+    def __init__(self, disturbance: Callable[..., tuple[Any, Any]], batch: Batch, bus: int) -> None:
+        self._disturbance = disturbance
+        self._applied = batch.bind("xfrc_applied")[:, bus]
+
+    def __call__(self, now: float, truth: Measurement) -> Array:
+        """Apply it and return force [N], inertial axes, and torque [N m], body axes, (N, 6)."""
+        rows = []
+        for one in map(Measurement, *truth):
+            try:
+                force, torque = self._disturbance(now, one)
+                rows.append(np.concatenate([np.asarray(force, float), np.asarray(torque, float)]))
+            except Exception as error:
+                raise FlightError(
+                    f"the disturbance raised {type(error).__name__}: {error}"
+                ) from error
+        wrench = np.array(rows)
+        self._applied[:, :3] = wrench[:, :3]
+        self._applied[:, 3:] = attitude.rotate(truth.attitude, wrench[:, 3:])
+        return wrench
+
+
+def _until_trouble(block: Block) -> tuple[Block, str]:
+    """Return the block up to the first value that is not finite, and which one it is ('' if none).
+
+    A law may well signal infinity; what must be finite is the state and what acts on it.
+    """
+    first, name = len(block.time), ""
+    for topic in ("/command", "/measurement", "/state"):
+        for field, values in block.rows.get(topic, {}).items():
+            good = np.isfinite(values).reshape(len(values), -1).all(axis=1)
+            if not good.all() and int(np.argmin(good)) <= first:
+                first, name = int(np.argmin(good)), f"{topic}.{field}"
+    if not name:
+        return block, ""
+    problem = f"{name} is not finite at t = {block.time[first]:.6g} s"
+    rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
+    events = [event for event in block.events if event[0] < block.time[first]]
+    return Block(block.period, block.time[:first], rows, events), problem

@@ -1,0 +1,144 @@
+"""What a flight records: a list entry for each control period, turned into rows block by block."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjspace import attitude
+from mjspace.assembly import Assembly
+from mjspace.contract import Array, Measurement, Reference
+
+Rows = dict[str, dict[str, Array]]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive control periods: ``rows[topic][field]`` is (n, N, ...), ``time`` (n,) [s]."""
+
+    period: int
+    """Of the first row."""
+    time: Array
+    rows: Rows
+    events: list[tuple[float, int, str]]
+    """(time, vehicle, message)."""
+
+
+def one_vehicle(block: Block, vehicle: int = 0) -> Rows:
+    """Return the block's rows without the vehicle axis."""
+    return {t: {f: a[:, vehicle] for f, a in fields.items()} for t, fields in block.rows.items()}
+
+
+def shapes(block: Block) -> dict[str, dict[str, tuple[int, ...]]]:
+    """Return the shape of each field for one vehicle at one time."""
+    return {t: {f: a.shape[2:] for f, a in fields.items()} for t, fields in block.rows.items()}
+
+
+class Columns:
+    """Where things stand in a row of MuJoCo's integration state."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        model = assembly.vehicle.model
+        before_qpos = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
+        before_qvel = before_qpos + model.nq
+        # The free joint comes first; its angular velocity is in body axes, its linear in inertial.
+        self.position = slice(before_qpos, before_qpos + 3)
+        self.attitude = slice(before_qpos + 3, before_qpos + 7)
+        self.velocity = slice(before_qvel, before_qvel + 3)
+        self.rate = slice(before_qvel + 3, before_qvel + 6)
+        self.wheel_speed = slice(
+            before_qvel + 6, before_qvel + 6 + len(assembly.vehicle.wheel_axes)
+        )
+
+    def truth(self, physics: Array) -> Measurement:
+        """Return what ideal sensors see, as views of the state rows."""
+        return Measurement(
+            physics[..., self.attitude], physics[..., self.rate], physics[..., self.wheel_speed]
+        )
+
+
+@dataclass
+class Tape:
+    """One list entry for each control period since the last block; arrays have a vehicle axis."""
+
+    period: int
+    physics: list[Array] = field(default_factory=list)
+    sensors: list[dict[str, Array]] = field(default_factory=list)
+    law: list[Any] = field(default_factory=list)
+    measurement: list[Measurement] = field(default_factory=list)
+    reference: list[Reference] = field(default_factory=list)
+    command: list[Any] = field(default_factory=list)
+    wheel_torque: list[Array] = field(default_factory=list)
+    saturated: list[Array] = field(default_factory=list)
+    signals: list[Any] = field(default_factory=list)
+    push: list[Array] = field(default_factory=list)
+    sensordata: list[Array] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        """Return the number of whole periods: the sensor data is recorded last."""
+        return len(self.sensordata)
+
+    def block(self, assembly: Assembly, columns: Columns, saturated_before: Array) -> Block:
+        """Return the recorded periods as rows."""
+        n, vehicle = len(self), assembly.vehicle
+        physics = np.array(self.physics[:n])
+        data = np.array(self.sensordata)
+        reference = {name: a[:, None] for name, a in _fields(self.reference[:n]).items()}
+        truth = columns.truth(physics)
+        state = {"physics": physics}
+        state |= {f"law_{name}": a for name, a in _fields(self.law[:n]).items()}
+        state |= {
+            f"sensor_{name}": np.array([s[name] for s in self.sensors[:n]])
+            for name in self.sensors[0]
+        }
+        environment = data[..., vehicle.environment]
+        if self.push:
+            environment = environment + np.array(self.push[:n])
+        rows: Rows = {
+            "/state": state,
+            "/truth": {
+                **truth._asdict(),
+                "position": physics[..., columns.position],
+                "velocity": physics[..., columns.velocity],
+                "momentum": data[..., vehicle.momentum],
+                "energy": data[..., vehicle.kinetic],
+                "attitude_error": attitude.rotation_angle(truth.attitude, reference["attitude"])[
+                    ..., None
+                ],
+            },
+            "/measurement": _fields(self.measurement[:n]),
+            "/reference": {
+                name: np.broadcast_to(a, (n, physics.shape[1], a.shape[-1]))
+                for name, a in reference.items()
+            },
+            "/command": {
+                **_fields(self.command[:n]),
+                "wheel_torque": np.array(self.wheel_torque[:n]),
+            },
+            "/law": _fields(self.signals[:n]),
+            "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
+        }
+        time = (self.period + np.arange(n)) * assembly.scenario.rates.control
+        events = _saturation_events(time, np.array(self.saturated[:n], bool), saturated_before)
+        return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
+
+
+def _fields(tuples: list[Any]) -> dict[str, Array]:
+    """Return the named tuples' fields as arrays with a period axis."""
+    if not tuples or not tuples[0]:
+        return {}
+    return {
+        name: np.array(values)
+        for name, values in zip(tuples[0]._fields, zip(*tuples, strict=True), strict=True)
+    }
+
+
+def _saturation_events(
+    time: Array, saturated: Array, before: Array
+) -> list[tuple[float, int, str]]:
+    rising = saturated & ~np.concatenate([before[None], saturated[:-1]])
+    return [
+        (float(time[k]), int(vehicle), f"wheel_{wheel} saturated")
+        for k, vehicle, wheel in np.argwhere(rising)
+    ]
