@@ -1,0 +1,125 @@
+"""The vehicle's environment: packs a scenario's table for the native callbacks, and installs them.
+
+The callbacks are inert until a vehicle's ``userdata`` asks for forces; a reset of MuJoCo's state
+clears it, so that it must be written again afterwards.
+"""
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mjspace import environment_kernel as kernel
+from mjspace import kepler, struct_offsets
+from mjspace.contract import Array
+from mjspace.scenario import DisturbanceTorque, Environment, Orbit
+
+SENSOR = "environment"
+"""Name of the user sensor (6 numbers, needstage "vel") that is given the environment's total on the
+bus: force [N] in world axes, torque [N m] about the bus's origin in body axes."""
+
+
+def install() -> None:
+    """Make the native callbacks this process's ``mjcb_passive`` and ``mjcb_sensor``.
+
+    Raises:
+        RuntimeError: MuJoCo's structs are not laid out as it says.
+    """
+    passive, sensor = _callbacks()
+    mujoco.set_mjcb_passive(passive.ctypes)
+    mujoco.set_mjcb_sensor(sensor.ctypes)
+
+
+@functools.cache
+def _callbacks() -> tuple[Any, Any]:
+    offsets = struct_offsets.find()
+    return kernel.passive_callback(*offsets), kernel.sensor_callback(*offsets)
+
+
+def userdata_size(environment: Environment, friction: Mapping[str, float]) -> int:
+    """Return the ``nuserdata`` that a model needs for ``userdata`` with the same arguments."""
+    return kernel.HEADER + sum(block.size for block in _blocks(environment, friction, {}))
+
+
+def userdata(model: Any, environment: Environment, friction: Mapping[str, float]) -> Array:
+    """Return a vehicle's ``userdata``, shape (model.nuserdata,).
+
+    ``friction`` is the Coulomb friction [N m] of hinges, by name. The bus is the body of the first
+    free joint.
+
+    Raises:
+        ValueError: the model has no free joint, no such hinge, too little userdata or another kind
+            of sensor under our sensor's name; or the orbit meets the planet.
+    """
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    if free.size == 0:
+        raise ValueError("the model has no free joint: the environment needs a bus to act on")
+    needed = userdata_size(environment, friction)
+    if model.nuserdata < needed:
+        raise ValueError(f"the model's nuserdata is {model.nuserdata}: {needed} are needed")
+    dofs = {name: _hinge_dof(model, name) for name in friction}
+    header = np.array([kernel.MAGIC, model.nv, model.jnt_dofadr[free[0]], _sensor_address(model)])
+    packed = np.concatenate([header, *_blocks(environment, friction, dofs)])
+    return np.pad(packed, (0, model.nuserdata - packed.size))
+
+
+def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
+    """Return where the frame's origin is, from the planet's centre, in inertial axes [m].
+
+    ``time`` [s] of shape (...) gives positions of shape (..., 3).
+
+    Raises:
+        ValueError: the orbit meets the planet.
+    """
+    times = np.asarray(time, dtype=np.float64)
+    packed = kepler.pack(orbit)
+    positions = [kepler.position(packed, instant) for instant in times.ravel()]
+    return np.reshape(positions, (*times.shape, 3))
+
+
+def _blocks(
+    environment: Environment, friction: Mapping[str, float], dofs: Mapping[str, int]
+) -> list[Array]:
+    blocks = []
+    if environment.orbit is not None:
+        blocks.append(_block(kernel.ORBIT, kepler.pack(environment.orbit)))
+    for torque in environment.torques:
+        kind = kernel.BODY_TORQUE if torque.frame == "body" else kernel.INERTIAL_TORQUE
+        blocks.append(_block(kind, _pack_torque(torque)))
+    if friction:
+        pairs = [(dofs.get(name, 0), coefficient) for name, coefficient in friction.items()]
+        blocks.append(_block(kernel.FRICTION, np.ravel(pairs)))
+    return blocks
+
+
+def _block(kind: float, payload: Array) -> Array:
+    return np.concatenate([[kind, payload.size], payload])
+
+
+def _pack_torque(torque: DisturbanceTorque) -> Array:
+    series = [np.array(torque.bias)]
+    for sine in torque.sines:
+        amplitude, phase = np.array(sine.amplitude), np.array(sine.phase)
+        series += [np.array([sine.frequency]), amplitude * np.cos(phase), amplitude * np.sin(phase)]
+    return np.concatenate(series)
+
+
+def _hinge_dof(model: Any, name: str) -> int:
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if joint < 0 or model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
+        raise ValueError(f"friction: no hinge {name!r} in the model")
+    return int(model.jnt_dofadr[joint])
+
+
+def _sensor_address(model: Any) -> int:
+    sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, SENSOR)
+    if sensor < 0:
+        return -1
+    user = model.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_USER
+    early = model.sensor_needstage[sensor] < int(mujoco.mjtStage.mjSTAGE_VEL)
+    if not user or early or model.sensor_dim[sensor] != 6:
+        raise ValueError(f'sensor {SENSOR!r} must be a user sensor with dim="6" needstage="vel"')
+    return int(model.sensor_adr[sensor])
