@@ -6,13 +6,18 @@ import subprocess
 import sys
 import sysconfig
 import venv
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
 NOT_SOURCE = (".*", "*.egg-info", "build", "dist", "runs", "__pycache__")
+MAPPED = {
+    "mjspace": "mjspace",
+    "controllers": "mjspace/controllers",
+    "assets": "mjspace/assets",
+}
 
 
 @pytest.fixture(scope="module")
@@ -34,17 +39,8 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """
     home = tmp_path_factory.mktemp("installed")
     venv.create(home)
-    pip = [
-        sys.executable,
-        "-m",
-        "uv",
-        "pip",
-        "install",
-        "--no-deps",
-        "--python",
-        home / "bin/python",
-    ]
-    subprocess.run([*pip, wheel], check=True)
+    install = ["-m", "uv", "pip", "install", "--no-deps", "--python"]
+    subprocess.run([sys.executable, *install, home, wheel], check=True)
     (packages,) = home.glob("lib/python*/site-packages")
     (packages / "borrowed.pth").write_text(sysconfig.get_path("purelib"))
     return home
@@ -54,12 +50,8 @@ def test_wheel_holds_every_file_of_the_package_and_nothing_else(wheel: Path) -> 
     with ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
     wanted = {
-        str(PurePosixPath(place, path.relative_to(ROOT / folder)))
-        for folder, place in {
-            "mjspace": "mjspace",
-            "controllers": "mjspace/controllers",
-            "assets": "mjspace/assets",
-        }.items()
+        f"{package}/{path.relative_to(ROOT / folder).as_posix()}"
+        for folder, package in MAPPED.items()
         for path in (ROOT / folder).rglob("*")
         if path.is_file() and "__pycache__" not in path.parts
     }
@@ -67,19 +59,19 @@ def test_wheel_holds_every_file_of_the_package_and_nothing_else(wheel: Path) -> 
 
 
 def test_installed_package_flies_from_another_folder(installed: Path, tmp_path: Path) -> None:
-    def run(*command: str | Path) -> "subprocess.CompletedProcess[str]":
-        # A stray PYTHONPATH would let the repository in.
-        alone = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    # A stray PYTHONPATH would let the repository in.
+    alone = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+
+    def run(program: str, *words: str) -> "subprocess.CompletedProcess[str]":
+        command = [installed / "bin" / program, *words]
         return subprocess.run(command, cwd=tmp_path, env=alone, text=True, capture_output=True)
 
-    show = "import mjspace, mjspace.controllers, mjspace.assets as a; print(mjspace.__file__, a.__file__)"
-    found = run(installed / "bin/python", "-c", show)
-    assert found.stdout.count(str(installed)) == 2, found.stderr
+    names = [package.replace("/", ".") for package in MAPPED.values()]
+    show = f"import {', '.join(names)}; print({'.__file__, '.join(names)}.__file__)"
+    found = run("python", "-c", show)
+    assert found.stdout.count(str(installed)) == len(names), found.stderr
 
-    flight = run(
-        *(installed / "bin/mjspace", "run", "contraction-adaptive", "--duration", "0.2"),
-        *("--out", "flight"),
-    )
-    # So short a flight fails the checks on its end (1); bad input would be 2, a crash anything.
+    flight = run("mjspace", "run", "contraction-adaptive", "--duration", "0.2", "--out", "flight")
+    # So short a flight fails the checks on its end: status 1, which a crash would have too.
     assert flight.returncode in (0, 1), flight.stderr
-    assert list(tmp_path.glob("flight/**/*.mcap"))
+    assert list(tmp_path.glob("flight/**/*.mcap")), flight.stderr
