@@ -54,7 +54,7 @@ def validate(table: dict[str, Any], where: str, origins: Mapping[str, str] = {})
         problems = error.errors()
         first = problems[0]
         key = ".".join(str(part) for part in first["loc"])
-        source = next((o for k, o in origins.items() if key == k or key.startswith(k + ".")), where)
+        source = next((o for k, o in origins.items() if _related(k, key)), where)
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
         raise InputError(f"{source}: {_explain(key, first)}{more}") from None
 
@@ -114,6 +114,11 @@ def _override(table: dict[str, Any], override: str, option: str = "--set") -> st
     else:
         raise InputError(f"{option} {override}: {last!r} is not in a table")
     return key
+
+
+def _related(one: str, other: str) -> bool:
+    """Return whether one of the dotted keys is the other or lies under it."""
+    return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 
 def _explain(key: str, problem: Any) -> str:

@@ -1,0 +1,108 @@
+"""Judging logs made by hand, where every statistic is known."""
+
+
+import numpy as np
+import pytest
+
+from mjspace.checks import judge, refuse_unknown
+from mjspace.errors import InputError
+from mjspace.scenario import Check
+
+
+class Tape:
+    """A log in memory: two chunks of one topic."""
+
+    topics = {"/truth": {"error": (1,), "rate": (3,)}}  # noqa: RUF012
+
+    def __init__(self, error: np.ndarray, rate: np.ndarray) -> None:
+        time = np.arange(len(error)) / 10.0
+        self._rows = {"time": time, "error": error[:, None], "rate": rate}
+
+    def blocks(self, topic, fields, start, end):
+        time = self._rows["time"]
+        for part in np.array_split(np.arange(len(time)), 2):
+            inside = (time[part] >= start) & (time[part] <= (np.inf if end is None else end))
+            if inside.any():
+                yield {name: rows[part][inside] for name, rows in self._rows.items()}
+
+
+ERROR = np.array([3.0, -5.0, 2.0, 1.0, 0.5, 0.25])
+RATE = np.outer(ERROR, [3.0, 0.0, 4.0])
+
+
+def measure(**check: object) -> float:
+    check = {"name": "x", "below": 1.0} | check
+    return judge(Tape(ERROR, RATE), [Check.model_validate(check)])[0].measured
+
+
+@pytest.mark.parametrize(
+    ("statistic", "value"),
+    [
+        ("max", 3.0),
+        ("min", -5.0),
+        ("mean", ERROR.mean()),
+        ("rms", np.sqrt((ERROR**2).mean())),
+        ("final", 0.25),
+        ("drift", 8.0),
+    ],
+)
+def test_statistics_of_a_scalar(statistic: str, value: float) -> None:
+    assert measure(signal="truth.error", statistic=statistic) == pytest.approx(value, rel=1e-15)
+
+
+def test_a_vector_is_judged_by_its_norm_and_a_component_by_itself() -> None:
+    assert measure(signal="truth.rate") == 25.0
+    assert measure(signal="truth.rate[2]") == 12.0
+    assert measure(signal="/truth.rate[2]", statistic="min") == -20.0
+
+
+def test_the_window_holds_both_its_ends() -> None:
+    assert measure(signal="truth.error", start=0.2, end=0.3) == 2.0
+    assert measure(signal="truth.error", start=0.2, end=0.3, statistic="min") == 1.0
+    assert np.isnan(measure(signal="truth.error", start=7.0))
+
+
+def test_target_and_relative() -> None:
+    found = measure(signal="truth.rate", target=[3, 0, 4], statistic="final")
+    assert found == pytest.approx(0.75 * 5.0)
+    found = measure(signal="truth.rate", target=[3, 0, 4], statistic="final", relative=True)
+    assert found == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize(
+    ("below", "above", "passed"),
+    [(3.1, None, True), (3.0, None, False), (None, 2.9, True), (None, 3.0, False), (4, 3.5, False)],
+)
+def test_bounds(below: float | None, above: float | None, passed: bool) -> None:
+    check = Check(name="x", signal="truth.error", below=below, above=above)
+    assert judge(Tape(ERROR, RATE), [check])[0].passed is passed
+
+
+def test_what_is_no_number_passes_no_check() -> None:
+    broken = ERROR.copy()
+    broken[1] = np.nan
+    for statistic in ("max", "min", "mean", "rms", "drift"):
+        check = Check(name="x", signal="truth.error", statistic=statistic, below=1e9, above=-1e9)
+        assert not judge(Tape(broken, RATE), [check])[0].passed
+    empty = Check(name="x", signal="truth.error", start=9.0, below=1e9)
+    assert not judge(Tape(ERROR, RATE), [empty])[0].passed
+
+
+@pytest.mark.parametrize(
+    ("signal", "message"),
+    [
+        ("truth.eror", r"checks\.0\.signal.*truth\.error"),
+        ("truht.error", "truth.error"),
+        ("truth.rate[3]", "3 components"),
+        ("error", "topic.field"),
+    ],
+)
+def test_unknown_signals_are_refused(signal: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        refuse_unknown([Check(name="x", signal=signal, below=1)], Tape.topics)
+
+
+def test_a_target_of_the_wrong_length_is_refused() -> None:
+    check = Check(name="x", signal="truth.rate", below=1, target=[1, 2])
+    with pytest.raises(InputError, match=r"checks\.0\.target: 2 numbers, truth\.rate has 3"):
+        refuse_unknown([check], Tape.topics)
