@@ -55,7 +55,7 @@ def test_orbit_is_a_solution_of_the_two_body_problem(body: str) -> None:
 def test_elements_mean_what_they_say() -> None:
     polar = Orbit(semi_major_axis=1e7, eccentricity=0.2, inclination=np.pi / 2)
     node = orbit_position(polar, 0.0)
-    # at the periapsis, which is on the ascending node, which is on the x axis; 1 ulp of 1e7 m is 2e-9
+    # the periapsis, on the ascending node, on the x axis; 1 ulp of 1e7 m is 2e-9
     np.testing.assert_allclose(node, [8e6, 0.0, 0.0], atol=4e-9)
     northward = orbit_position(polar, 1.0) - node
     assert northward[2] > 0.0
@@ -77,5 +77,5 @@ def test_position_keeps_the_shape_of_time() -> None:
 
 
 def test_an_orbit_through_the_planet_is_refused() -> None:
-    with pytest.raises(ValueError, match="periapsis, 6e\\+06 m .* inside the earth"):
+    with pytest.raises(ValueError, match=r"periapsis, 6e\+06 m .* inside the earth"):
         orbit_position(Orbit(semi_major_axis=1e7, eccentricity=0.4), 0.0)
