@@ -11,6 +11,12 @@ import numpy as np
 from mjspace.contract import Array
 
 
+def normalize(vector: Array) -> Array:
+    """Return ``vector`` divided by its length along the last axis; a quaternion or any other."""
+    unit: Array = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+    return unit
+
+
 def multiply(p: Array, q: Array) -> Array:
     """Return the product p q, shape (..., 4): the rotation q, then p."""
     p0, p1, p2, p3 = _components(p)
@@ -65,7 +71,7 @@ def from_matrix(matrix: Array) -> Array:
     rows = np.stack([np.stack(row, axis=-1) for row in outer], axis=-2)
     longest = np.argmax(np.diagonal(rows, axis1=-2, axis2=-1), axis=-1)
     row = np.take_along_axis(rows, longest[..., None, None], axis=-2)[..., 0, :]
-    return _positive_scalar(row / np.linalg.norm(row, axis=-1, keepdims=True))
+    return _positive_scalar(normalize(row))
 
 
 def from_rotation_vector(vector: Array) -> Array:

@@ -1,0 +1,254 @@
+"""Attitude tracking by contraction analysis, known or estimated inertia: Servín 2022 (paper 002).
+
+The error is e = w - wd, where the wanted rate wd = 2 J(q)^T (qd' + lc qd) steers q to qd. All
+arrays may have leading vehicle axes. q and -q are one attitude: at reset each law takes the sign of
+q nearer to qd, and then keeps q's path continuous, so that none unwinds (erratum 10) and none minds
+which sign a sensor reports.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from mjspace.contract import Array, Measurement, Reference, gain
+
+from . import contraction_kernels as kernels
+
+
+class Command(NamedTuple):
+    """What the laws ask for."""
+
+    torque: Array
+    """On the bus [N m], body axes, (..., 3)."""
+
+
+class IdealState(NamedTuple):
+    """Memory of the ideal law."""
+
+    attitude: Array
+    """Last measured quaternion, on the branch chosen at reset, (..., 4)."""
+
+
+class IdealSignals(NamedTuple):
+    """What the ideal law shows."""
+
+    e: Array
+    """w - wd [rad/s], body axes, (..., 3)."""
+    wd: Array
+    """Wanted rate [rad/s], body axes, (..., 3)."""
+
+
+class GradientState(NamedTuple):
+    """Memory of the gradient law."""
+
+    attitude: Array
+    """As in the ideal law's."""
+    theta_hat: Array
+    """Estimates of m11 m12 m13 m22 m23 m33 [kg m^2] and of the momentum hI [N m s], (..., 9)."""
+
+
+class GradientSignals(NamedTuple):
+    """What the gradient law shows: as the ideal law, and the estimates it used."""
+
+    e: Array
+    wd: Array
+    theta_hat: Array
+
+
+class AdaptiveState(NamedTuple):
+    """Memory of the adaptive law."""
+
+    attitude: Array
+    """As in the ideal law's."""
+    theta_hat: Array
+    """As in the gradient law's."""
+    g: Array
+    """Z times the estimates' error, known without knowing the error, (..., 9)."""
+    Z: Array
+    """Information gathered on the parameters, (..., 9, 9)."""
+    w_f: Array
+    """Filtered rate [rad/s], (..., 3)."""
+    P_f: Array
+    """Filtered S(w) R^T [rad/s], (..., 3, 3)."""
+    t_f: Array
+    """Filtered torque [N m], (..., 3)."""
+
+
+class AdaptiveSignals(NamedTuple):
+    """What the adaptive law shows: as the gradient law, and its prediction error."""
+
+    e: Array
+    wd: Array
+    theta_hat: Array
+    eps: Array
+    """Yf theta_hat less the filtered torque [N m], (..., 3)."""
+
+
+@dataclass(frozen=True)
+class Ideal:
+    """Known inertia: tau = H wd' - p x wd - Kc e, (3.6).
+
+    In place of the printed h = R^T hI, which needs a constant momentum, the tachometers give
+    p = H w + sum a Jw (a.w + Omega): equal on a torque-free vehicle, and right under any torque.
+    """
+
+    inertia: Array = gain("kg m^2", (3, 3))
+    """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
+    wheel_axes: Array = gain(shape=(None, 3))
+    """Unit spin axes, body axes, one row for each wheel."""
+    wheel_inertia: Array = gain("kg m^2", (None,))
+    """Axial inertia of each wheel."""
+    rate_gain: float = gain("N m s/rad", default=25.0)
+    """Kc, the same on each axis."""
+    attitude_gain: float = gain("1/s", default=25.0)
+    """lc: contraction rate of the attitude."""
+    torque_limit: float = gain("N m", default=inf)
+    """Largest command on each axis."""
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "rate_gain", "attitude_gain", "torque_limit")
+
+    def reset(self, measurement: Measurement, reference: Reference) -> IdealState:
+        """Return the state that starts on the branch nearer to the reference."""
+        return IdealState(_nearer(measurement, reference))
+
+    def step(
+        self, state: IdealState, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[IdealState, Command, IdealSignals]:
+        """Return the next state, the torque and the errors."""
+        seen, rate, wheel_speed = measurement
+        vehicle = (wheel_speed, self.inertia, self.wheel_axes, self.wheel_inertia, self._gains)
+        torque, e, wd, attitude = kernels.ideal(seen, rate, *reference, *state, *vehicle)
+        return IdealState(attitude), Command(torque), IdealSignals(e, wd)
+
+    @cached_property
+    def _gains(self) -> Array:
+        return np.array([self.attitude_gain, self.rate_gain, self.torque_limit])
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Estimated inertia, by the gradient alone: tau = Y theta_hat - Kc e, theta_hat' = -ga Y^T e.
+
+    Equations (4.2) and (4.21); ga stays above zero where the paper prints zero (erratum 19). The
+    estimate of hI assumes a constant total momentum. Explicit Euler at the control period.
+    """
+
+    control_period: float = gain("s")
+    """Time from one step to the next."""
+    rate_gain: float = gain("N m s/rad", default=25.0)
+    """Kc, the same on each axis."""
+    attitude_gain: float = gain("1/s", default=25.0)
+    """lc: contraction rate of the attitude."""
+    adaptation_gain: float = gain(default=1.0)
+    """ga."""
+    torque_limit: float = gain("N m", default=inf)
+    """Largest command on each axis."""
+
+    def __post_init__(self) -> None:
+        positive = ("rate_gain", "attitude_gain", "adaptation_gain", "torque_limit")
+        _require_positive(self, "control_period", *positive)
+
+    def reset(self, measurement: Measurement, reference: Reference) -> GradientState:
+        """Return the state that knows nothing, on the branch nearer to the reference."""
+        lead = measurement.rate.shape[:-1]
+        return GradientState(_nearer(measurement, reference), np.zeros((*lead, 9)))
+
+    def step(
+        self, state: GradientState, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[GradientState, Command, GradientSignals]:
+        """Return the next state, the torque, the errors and the estimates."""
+        seen, rate, _ = measurement
+        torque, e, wd, *after = kernels.gradient(seen, rate, *reference, *state, self._gains)
+        return GradientState(*after), Command(torque), GradientSignals(e, wd, state.theta_hat)
+
+    @cached_property
+    def _gains(self) -> Array:
+        control = [self.attitude_gain, self.rate_gain, self.torque_limit]
+        return np.array([*control, self.adaptation_gain, self.control_period])
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """Estimated inertia and momentum: the composite law (4.2), (4.5)-(4.9).
+
+    With erratum 15: ga Yf^T eps, and da ga Z. The estimate of hI assumes a constant total momentum.
+    The nine parameters converge only if the motion excites them; no turn about one fixed axis does
+    (erratum 21). Explicit Euler at the control period: at 1 kHz the sweep's largest |q - qd| is
+    2.33e-2 against 2.32e-2 in continuous time. The filter sees the torque within its limit, so the
+    limit must not be above what the actuators give.
+    """
+
+    control_period: float = gain("s")
+    """Time from one step to the next."""
+    rate_gain: float = gain("N m s/rad", default=25.0)
+    """Kc, the same on each axis."""
+    attitude_gain: float = gain("1/s", default=25.0)
+    """lc: contraction rate of the attitude."""
+    filter_bandwidth: float = gain("rad/s", default=2.0)
+    """lF, of the filters that stand in for the unmeasured acceleration."""
+    adaptation_coupling: float = gain(default=2.0)
+    """da: share of the prediction error against that of the tracking error."""
+    adaptation_gain: float = gain(default=1.0)
+    """ga."""
+    forgetting: float = gain("1/s", default=0.1)
+    """lf, of the information gathered; zero forgets nothing."""
+    torque_limit: float = gain("N m", default=inf)
+    """Largest command on each axis."""
+
+    def __post_init__(self) -> None:
+        positive = ("filter_bandwidth", "adaptation_coupling", "adaptation_gain")
+        _require_positive(self, "control_period", "rate_gain", "attitude_gain", *positive)
+        _require_positive(self, "torque_limit")
+        if self.forgetting < 0.0:
+            raise ValueError(f"forgetting is {self.forgetting:g} 1/s: zero or more would do")
+        if self.filter_bandwidth * self.control_period >= 1.0:
+            raise ValueError(
+                f"filter_bandwidth is {self.filter_bandwidth:g} rad/s, control_period "
+                f"{self.control_period:g} s: less than {1 / self.control_period:g} rad/s would do"
+            )
+
+    def reset(self, measurement: Measurement, reference: Reference) -> AdaptiveState:
+        """Return the state that knows nothing, on the branch nearer to the reference.
+
+        The filtered rate starts at the rate: from zero it would err for good (erratum 25).
+        """
+        lead = measurement.rate.shape[:-1]
+        return AdaptiveState(
+            attitude=_nearer(measurement, reference),
+            theta_hat=np.zeros((*lead, 9)),
+            g=np.zeros((*lead, 9)),
+            Z=np.zeros((*lead, 9, 9)),
+            w_f=measurement.rate.copy(),
+            P_f=np.zeros((*lead, 3, 3)),
+            t_f=np.zeros((*lead, 3)),
+        )
+
+    def step(
+        self, state: AdaptiveState, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[AdaptiveState, Command, AdaptiveSignals]:
+        """Return the next state, the torque, the errors and the estimates."""
+        seen, rate, _ = measurement
+        torque, e, wd, eps, *after = kernels.adaptive(seen, rate, *reference, *state, self._gains)
+        return AdaptiveState(*after), Command(torque), AdaptiveSignals(e, wd, state.theta_hat, eps)
+
+    @cached_property
+    def _gains(self) -> Array:
+        control = [self.attitude_gain, self.rate_gain, self.torque_limit]
+        adaptation = [self.adaptation_gain, self.control_period, self.filter_bandwidth]
+        return np.array([*control, *adaptation, self.adaptation_coupling, self.forgetting])
+
+
+def _nearer(measurement: Measurement, reference: Reference) -> Array:
+    """Return the measured q or -q, whichever makes an angle below 180 deg with the reference."""
+    along = np.sum(measurement.attitude * reference.attitude, axis=-1, keepdims=True)
+    return np.where(along < 0.0, -measurement.attitude, measurement.attitude)
+
+
+def _require_positive(law: object, *names: str) -> None:
+    for name in names:
+        if not getattr(law, name) > 0.0:
+            raise ValueError(f"{name} is {getattr(law, name):g}: more than zero would do")

@@ -1,0 +1,164 @@
+"""Attitude tracking by immersion and invariance, in Euler angles: paper 000.
+
+The angles are roll, pitch, yaw, R = Rz Ry Rx, body to inertial, and are unwrapped: 5 rad of yaw to
+go are turned through, even if 1.3 rad the other way would do (erratum 12). The law is local: pitch
+= +-90 deg is singular, and nothing here steps around it (erratum 10); watch ``singularity``.
+"""
+
+# mypy: disable-error-code="no-untyped-call, call-arg"
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, pi, sin
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import guvectorize, njit
+
+from mjspace import attitude as att
+from mjspace.contract import Array, Measurement, Reference, gain
+
+
+class Command(NamedTuple):
+    """What the law asks for."""
+
+    torque: Array
+    """On the bus [N m], body axes, (..., 3)."""
+
+
+class State(NamedTuple):
+    """Memory: which turn the angles are on."""
+
+    angles: Array
+    """Last measured roll, pitch, yaw [rad], unwrapped, (..., 3)."""
+    wanted_angles: Array
+    """Last wanted roll, pitch, yaw [rad], unwrapped, (..., 3)."""
+
+
+class Signals(NamedTuple):
+    """What the law shows."""
+
+    x_e: Array
+    """Wanted less measured angles [rad], (..., 3)."""
+    z: Array
+    """Distance from the manifold, x' - x_d' - K x_e [rad/s], (..., 3)."""
+    singularity: Array
+    """How far the pitch is from +-90 deg [rad], (..., 1)."""
+
+
+@dataclass(frozen=True)
+class ImmersionInvariance:
+    """Law (15) of paper 000, with p = R^T p_r (erratum 2) read from the tachometers.
+
+    The torque H J^-1 (v - J' w) - p x w, v = x_d'' + (K + Gamma) x_e' + Gamma K x_e, makes
+    z' = -Gamma z and x_e' = -K x_e - z. K and Gamma may be exchanged (erratum 8).
+    """
+
+    inertia: Array = gain("kg m^2", (3, 3))
+    """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
+    wheel_axes: Array = gain(shape=(None, 3))
+    """Unit spin axes, body axes, one row for each wheel."""
+    wheel_inertia: Array = gain("kg m^2", (None,))
+    """Axial inertia of each wheel."""
+    target_gain: float = gain("1/s", default=10.0)
+    """K: rate of the target system x_e' = -K x_e."""
+    manifold_gain: float = gain("1/s", default=5.0)
+    """Gamma: rate at which the manifold z = 0 is reached."""
+    unwrap_from: Array = gain("rad", (3,), default=(0.0, 0.0, 0.0))
+    """The first measured roll and yaw are taken within half a turn of these."""
+
+    def __post_init__(self) -> None:
+        for name in ("target_gain", "manifold_gain"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} is {getattr(self, name):g} 1/s: more than zero would do")
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return the angles, the measured ones on the turn of ``unwrap_from``."""
+        angles = att.to_euler_zyx(measurement.attitude)
+        turns = np.rint((angles - self.unwrap_from) / (2.0 * pi))
+        wanted = np.broadcast_to(att.to_euler_zyx(reference.attitude), angles.shape)
+        return State(angles - 2.0 * pi * turns, wanted.copy())
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, Command, Signals]:
+        """Return the next state, the torque and the errors."""
+        torque, x_e, z, *angles = _law(*measurement, *reference, *state, *self._vehicle)
+        after = State(*angles)
+        singularity = 0.5 * pi - np.abs(after.angles[..., 1:2])
+        return after, Command(torque), Signals(x_e, z, singularity)
+
+    @cached_property
+    def _vehicle(self) -> tuple[Array, Array, Array, Array]:
+        gains = np.array([self.target_gain, self.manifold_gain])
+        return self.inertia, self.wheel_axes, self.wheel_inertia, gains
+
+
+@njit
+def _unwrapped(angle: Any, before: Any) -> Any:
+    """Return ``angle`` plus the whole turns that bring it nearest to ``before``."""
+    return angle - 2.0 * pi * np.rint((angle - before) / (2.0 * pi))
+
+
+@njit
+def _euler(q: Any, before: Any) -> Any:
+    """Return roll, pitch, yaw of a quaternion, roll and yaw unwrapped."""
+    q0, q1, q2, q3 = q
+    across, down = 2.0 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
+    pitch = np.arctan2(2.0 * (q0 * q2 - q1 * q3), np.sqrt(across * across + down * down))
+    yaw = np.arctan2(2.0 * (q1 * q2 + q0 * q3), q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3)
+    return _unwrapped(np.arctan2(across, down), before[0]), pitch, _unwrapped(yaw, before[2])
+
+
+@njit
+def _angle_rates(x: Any, w: Any) -> Any:
+    """Return x' = J(x) w."""
+    swing = sin(x[0]) * w[1] + cos(x[0]) * w[2]
+    yaw = swing / cos(x[1])
+    return w[0] + sin(x[1]) * yaw, cos(x[0]) * w[1] - sin(x[0]) * w[2], yaw
+
+
+@njit
+def _drift(x: Any, dx: Any, w: Any) -> Any:
+    """Return J'(x, x') w, what x'' is at constant w."""
+    cp, tp = cos(x[1]), sin(x[1]) / cos(x[1])
+    swing = sin(x[0]) * w[1] + cos(x[0]) * w[2]
+    dswing = (cos(x[0]) * w[1] - sin(x[0]) * w[2]) * dx[0]
+    yaw = (dswing + swing * tp * dx[1]) / cp
+    return dswing * tp + swing * dx[1] / (cp * cp), -swing * dx[0], yaw
+
+
+@guvectorize(
+    [f"void({'f8[:],' * 8}f8[:,:],f8[:,:],{'f8[:],' * 6}f8[:])"],
+    "(q),(v),(n),(q),(v),(v),(v),(v),(v,v),(n,v),(n),(g)->(v),(v),(v),(v),(v)",
+    cache=True,
+)
+def _law(
+    q: Any, w: Any, wheel_speed: Any, qd: Any, wr: Any, ar: Any, before: Any, wanted_before: Any,
+    H: Any, axes: Any, Jw: Any, gains: Any,
+    torque: Any, x_e: Any, z: Any, angles: Any, wanted_angles: Any,
+) -> None:  # fmt: skip
+    """Plain loops without fused or reordered sums: the same bits alone and in a batch."""
+    K, Gamma = gains
+    x, xd = _euler(q, before), _euler(qd, wanted_before)
+    dx, dxd = _angle_rates(x, w), _angle_rates(xd, wr)
+    carried, bend, turned = _drift(x, dx, w), _drift(xd, dxd, wr), _angle_rates(xd, ar)
+
+    a = np.empty(3)
+    for i in range(3):
+        angles[i], wanted_angles[i], x_e[i] = x[i], xd[i], xd[i] - x[i]
+        z[i] = dx[i] - dxd[i] - K * x_e[i]
+        # v - J' w, with v = -Gamma z + x_d'' + K (x_d' - x')
+        a[i] = turned[i] + bend[i] + K * (dxd[i] - dx[i]) - Gamma * z[i] - carried[i]
+    sr, cr, sp, cp = sin(x[0]), cos(x[0]), sin(x[1]), cos(x[1])
+    dw = (a[0] - sp * a[2], cr * a[1] + sr * cp * a[2], -sr * a[1] + cr * cp * a[2])
+
+    p = np.empty(3)
+    for i in range(3):
+        p[i] = H[i, 0] * w[0] + H[i, 1] * w[1] + H[i, 2] * w[2]
+    for n in range(Jw.size):
+        h = Jw[n] * (axes[n, 0] * w[0] + axes[n, 1] * w[1] + axes[n, 2] * w[2] + wheel_speed[n])
+        for i in range(3):
+            p[i] += axes[n, i] * h
+    gyro = (p[1] * w[2] - p[2] * w[1], p[2] * w[0] - p[0] * w[2], p[0] * w[1] - p[1] * w[0])
+    for i in range(3):
+        torque[i] = H[i, 0] * dw[0] + H[i, 1] * dw[1] + H[i, 2] * dw[2] - gyro[i]
