@@ -104,7 +104,7 @@ def _measure(log: Log, check: Check) -> float:
         if check.statistic == "drift":
             rows = rows - first
         values = rows[:, 0] if rows.shape[1] == 1 else np.linalg.norm(rows, axis=1)
-        if check.statistic in ("drift", "rms") or target is not None:
+        if check.statistic in ("peak", "drift") or target is not None:
             values = np.abs(values)
         count += len(values)
         total += float(np.sum(values**2 if check.statistic == "rms" else values))
@@ -119,6 +119,7 @@ def _measure(log: Log, check: Check) -> float:
     scale = float(np.linalg.norm(target)) if check.relative and target is not None else 1.0
     measured = {
         "max": peak,
+        "peak": peak,
         "drift": peak,
         "min": least,
         "mean": total / count,

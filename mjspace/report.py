@@ -80,4 +80,6 @@ def print_log(log: Log) -> None:
     table.add_row("attachments", ", ".join(sorted(log.attachments)))
     console.print(table)
     for time, level, message in log.events():
-        console.print(f"{time:12.6f} s  {level:7}  {message}", highlight=False, markup=False)
+        console.print(
+            f"{time:12.6f} s  {level:7}  {message}", highlight=False, markup=False, soft_wrap=True
+        )

@@ -255,9 +255,9 @@ class Check(Table):
     """What it says in the table of checks."""
     signal: str
     """``topic.field`` or ``topic.field[i]`` of the log: ``truth.attitude_error``."""
-    statistic: Literal["max", "min", "mean", "rms", "final", "drift"] = "max"
-    """Over the window: of the value, or of the norm of a vector; ``drift`` is the largest change
-    from the window's first value."""
+    statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
+    """Over the window: of the value, or of the norm of a vector; ``peak`` is the largest magnitude,
+    ``drift`` the largest change from the window's first value."""
     below: float | None = None
     """The statistic must be less; a number in SI or a quantity."""
     above: float | None = None

@@ -76,7 +76,9 @@ def fly(
     period = start.period
     while period <= last:
         tape, trouble = flight.record(period, last, stop)
-        block, problem = _until_trouble(tape.block(assembly, flight.columns, saturated))
+        block, problem = _until_trouble(
+            tape.block(assembly, flight.columns, saturated), flight.columns
+        )
         if len(block.time):
             yield block
         if problem or trouble:
@@ -87,6 +89,13 @@ def fly(
         period += len(tape)
 
 
+def _quiet_mujoco() -> None:
+    """Let MuJoCo neither print its warnings nor write them to a file: the loop reports them."""
+    config = mujoco.MjLogConfig.get()
+    config.logto_console = config.logto_file = False
+    mujoco.MjLogConfig.set(config)
+
+
 class _Flight:
     """The batch in flight, and what the sensors and the law remember."""
 
@@ -94,6 +103,7 @@ class _Flight:
         self, assembly: Assembly, start: Start, members: Sequence[int], threads: int
     ) -> None:
         scenario = assembly.scenario
+        _quiet_mujoco()
         environment.install()
         self.assembly = assembly
         self.columns = Columns(assembly)
@@ -121,17 +131,19 @@ class _Flight:
         due = clock.monotonic() + BLOCK_SECONDS
         now = first * control
         try:
-            for period, reference in enumerate(map(Reference, *references), first):
-                now = period * control
-                self._fly_period(tape, period, now, reference, flown=period < last)
-                if stop() or clock.monotonic() > due:
-                    break
+            # A law's infinities are found in what it commands, not in NumPy's warnings.
+            with np.errstate(all="ignore"):
+                for period, reference in enumerate(map(Reference, *references), first):
+                    now = period * control
+                    self._fly_period(tape, period, now, reference, flown=period < last)
+                    if stop() or clock.monotonic() > due:
+                        break
         except (SimulationError, FlightError) as error:
             return tape, f"stopped at t = {now:.6g} s: {error}"
         raised = np.flatnonzero(self.batch.warning[:, :, 1].any(axis=0))
         if len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name
-            return tape, f"MuJoCo warned ({warning}) before t = {now:.6g} s"
+            return tape, f"MuJoCo warned ({warning}) between t = {first * control:.6g} s and now"
         return tape, ""
 
     def _fly_period(
@@ -217,20 +229,25 @@ class _Push:
         return wrench
 
 
-def _until_trouble(block: Block) -> tuple[Block, str]:
-    """Return the block up to the first value that is not finite, and which one it is ('' if none).
+def _until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:
+    """Return the block up to the first value that cannot be flown, and which it is ('' if none).
 
-    A law may well signal infinity; what must be finite is the state and what acts on it.
+    A law may well signal infinity; what must be good is the motion and what acts on it.
     """
-    first, name = len(block.time), ""
-    for topic in ("/command", "/measurement", "/state"):
-        for field, values in block.rows.get(topic, {}).items():
-            good = np.isfinite(values).reshape(len(values), -1).all(axis=1)
-            if not good.all() and int(np.argmin(good)) <= first:
-                first, name = int(np.argmin(good)), f"{topic}.{field}"
-    if not name:
+    acting = {
+        "/state.physics": block.rows["/state"]["physics"][..., columns.motion],
+        **{f"/measurement.{name}": a for name, a in block.rows["/measurement"].items()},
+        **{f"/command.{name}": a for name, a in block.rows["/command"].items()},
+    }
+    first, culprit = len(block.time), ""
+    for name, values in acting.items():
+        # Also false for what is not a number.
+        good = (np.abs(values) < mujoco.mjMAXVAL).reshape(len(values), -1).all(axis=1)
+        if not good.all() and int(np.argmin(good)) <= first:
+            first, culprit = int(np.argmin(good)), name
+    if not culprit:
         return block, ""
-    problem = f"{name} is not finite at t = {block.time[first]:.6g} s"
+    problem = f"{culprit} is not finite, or beyond 1e10, at t = {block.time[first]:.6g} s"
     rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
     events = [event for event in block.events if event[0] < block.time[first]]
     return Block(block.period, block.time[:first], rows, events), problem

@@ -42,6 +42,7 @@ class Columns:
         model = assembly.vehicle.model
         before_qpos = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
         before_qvel = before_qpos + model.nq
+        self.motion = slice(before_qpos, before_qvel + model.nv)
         # The free joint comes first; its angular velocity is in body axes, its linear in inertial.
         self.position = slice(before_qpos, before_qpos + 3)
         self.attitude = slice(before_qpos + 3, before_qpos + 7)

@@ -40,6 +40,7 @@ def measure(**check: object) -> float:
     [
         ("max", 3.0),
         ("min", -5.0),
+        ("peak", 5.0),
         ("mean", ERROR.mean()),
         ("rms", np.sqrt((ERROR**2).mean())),
         ("final", 0.25),
@@ -81,7 +82,7 @@ def test_bounds(below: float | None, above: float | None, passed: bool) -> None:
 def test_what_is_no_number_passes_no_check() -> None:
     broken = ERROR.copy()
     broken[1] = np.nan
-    for statistic in ("max", "min", "mean", "rms", "drift"):
+    for statistic in ("max", "min", "peak", "mean", "rms", "drift"):
         check = Check(name="x", signal="truth.error", statistic=statistic, below=1e9, above=-1e9)
         assert not judge(Tape(broken, RATE), [check])[0].passed
     empty = Check(name="x", signal="truth.error", start=9.0, below=1e9)
