@@ -21,6 +21,8 @@ SENSOR = "environment"
 """Name of the user sensor (6 numbers, needstage "vel") that is given the environment's total on the
 bus: force [N] in world axes, torque [N m] about the bus's origin in body axes."""
 
+_NO_PASSIVE = int(mujoco.mjtDisableBit.mjDSBL_SPRING | mujoco.mjtDisableBit.mjDSBL_DAMPER)
+
 
 def install() -> None:
     """Make the native callbacks this process's ``mjcb_passive`` and ``mjcb_sensor``.
@@ -40,7 +42,11 @@ def _callbacks() -> tuple[Any, Any]:
 
 
 def userdata_size(environment: Environment, friction: Mapping[str, float]) -> int:
-    """Return the ``nuserdata`` that a model needs for ``userdata`` with the same arguments."""
+    """Return the ``nuserdata`` that a model needs for ``userdata`` with the same arguments.
+
+    Raises:
+        ValueError: the orbit meets the planet.
+    """
     return kernel.HEADER + sum(block.size for block in _blocks(environment, friction, {}))
 
 
@@ -51,12 +57,18 @@ def userdata(model: Any, environment: Environment, friction: Mapping[str, float]
     free joint.
 
     Raises:
-        ValueError: the model has no free joint, no such hinge, too little userdata or another kind
-            of sensor under our sensor's name; or the orbit meets the planet.
+        ValueError: the model has no free joint, no such hinge, no passive forces, too little
+            userdata or another kind of sensor under our sensor's name; or the orbit meets the
+            planet.
     """
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
     if free.size == 0:
         raise ValueError("the model has no free joint: the environment needs a bus to act on")
+    if (model.opt.disableflags & _NO_PASSIVE) == _NO_PASSIVE:
+        raise ValueError(
+            "the model disables springs and dampers both, and so, in MuJoCo, every passive force, "
+            "the environment among them: enable one"
+        )
     needed = userdata_size(environment, friction)
     if model.nuserdata < needed:
         raise ValueError(f"the model's nuserdata is {model.nuserdata}: {needed} are needed")

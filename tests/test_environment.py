@@ -438,6 +438,7 @@ def _small(xml: str, userdata: int = 50) -> Callable[[], Any]:
         (WHEEL, 50, {"wheel_9": 0.1}, "no hinge 'wheel_9'"),
         (BODY.replace('dim="6"', 'dim="5"'), 50, {}, 'dim="6" needstage="vel"'),
         (BODY.replace("vel", "pos"), 50, {}, 'dim="6" needstage="vel"'),
+        (BODY.replace("<flag ", '<flag spring="disable" damper="disable" '), 50, {}, "enable one"),
     ],
 )
 def test_models_that_will_not_do(
