@@ -23,7 +23,7 @@ A_LAW_MAY_IMPORT = (
 ONLY_IN = {
     "mujoco": (
         *("plant", "environment", "struct_offsets", "guards", "simulation", "tape", "recorder"),
-        *("geometry", "render", "replay", "environments"),
+        *("geometry", "offscreen", "render", "stage", "replay", "environments"),
     ),
     "mcap": ("log_*",),
     "dm_control": ("environments",),
