@@ -24,6 +24,10 @@ class Assembly:
     scenario: Scenario
     """As flown: with every gain of the law and the reference written out."""
     vehicle: Vehicle
+    qpos: Array
+    """At time zero, (nq,)."""
+    qvel: Array
+    """At time zero, (nv,)."""
     userdata: Array
     """The environment's parameters, one row (nuserdata,)."""
     wheels: ReactionWheels
@@ -83,9 +87,12 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
     flown["reference"] = flown["reference"].model_copy(
         update={"kind": _in_log("reference", scenario.reference.kind)}
     )
-    return Assembly(
+    qpos, qvel = _part("initial", plant.initial_state, vehicle, scenario.initial)
+    assembly = Assembly(
         scenario=scenario.model_copy(update=flown),
         vehicle=vehicle,
+        qpos=qpos,
+        qvel=qvel,
         userdata=_part(
             "environment",
             environment.userdata,
@@ -99,6 +106,8 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         disturbance=disturbance,
         sources=sources,
     )
+    _part("sensors", assembly.sensors, [0])
+    return assembly
 
 
 def _component(

@@ -17,6 +17,8 @@ import numpy as np
 from mjspace.quantity import to_si
 from mjspace.scenario import Component
 
+_SOURCE = "_mjspace_source"  # text of a user's module, whose file may be gone when it is asked for
+
 
 def load_object(kind: str, folder: Path) -> Any:
     """Return what ``"module:Name"`` or ``"file.py:Name"`` names.
@@ -72,7 +74,8 @@ def construct(
 
 def source_of(kind: type) -> str:
     """Return the text of the file that defines ``kind``."""
-    return Path(inspect.getfile(kind)).read_text()
+    text = getattr(sys.modules[kind.__module__], _SOURCE, None)
+    return text if text is not None else Path(inspect.getfile(kind)).read_text()
 
 
 def nearest(name: str, names: Any) -> str:
@@ -141,6 +144,7 @@ def _load_file(path: Path) -> ModuleType:
     if spec is None or spec.loader is None:
         raise ValueError(f"{path} is no Python file")
     module = importlib.util.module_from_spec(spec)
+    setattr(module, _SOURCE, text.decode())
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)

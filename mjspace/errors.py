@@ -18,10 +18,12 @@ class NoRendererError(RuntimeError):
 
 @contextmanager
 def blamed_on(key: str) -> Iterator[None]:
-    """Turn a ValueError from building a part into an InputError that names ``key``."""
+    """Turn a ValueError from building a part into an InputError that names ``key``, once."""
     try:
         yield
     except InputError:
         raise
     except ValueError as error:
-        raise InputError(f"{key}: {error}") from error
+        message = str(error)
+        named = message.startswith(key)
+        raise InputError(message if named else f"{key}: {message}") from error

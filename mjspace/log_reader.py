@@ -109,13 +109,13 @@ class Log:
             ValueError: the log has no such topic or field, or a chunk is damaged.
         """
         names = self._fields(topic, fields)
-        first = 0 if start is None else round(start * 1e9)
-        last = 2**63 if end is None else round(end * 1e9)
-        places = [c for c in self._found.chunks if c.end >= first and c.start <= last]
+        first = 0 if start is None else max(round(start * 1e9), 0)
+        stop = 2**63 if end is None else max(round(end * 1e9) + 1, 0)
+        places = [c for c in self._found.chunks if c.end >= first and c.start < stop]
         skip = 0
         for rows in self._rows(topic, places):
             stamps = rows["header"]["log_time"]
-            low, high = np.searchsorted(stamps, np.array([first, last + 1], np.uint64))
+            low, high = np.searchsorted(stamps, np.array([first, stop], np.uint64))
             if low + skip < high:
                 yield _columns(rows[low + skip : high : every], names)
             skip = (skip - (high - low)) % every

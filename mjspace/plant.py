@@ -7,7 +7,7 @@ velocity in BODY axes. The body origin is the vehicle's centre of mass, but for 
 
 import gzip
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from mjspace.contract import Array
 from mjspace.scenario import Initial, PlantTable, Rates
 
 _ASSETS = Path(str(files("mjspace.assets")))
-_WHEEL_GAP = 0.05  # m, between the hull and the centre of a wheel drawn outside it
+_WHEEL_GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
 
 
 class UnphysicalInertiaWarning(UserWarning):
@@ -80,20 +80,24 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
     model = _compile(spec, inertial)
     guards.check(model)
 
-    joints = [model.joint(f"wheel_{index}") for index in range(len(axes))]
     return Vehicle(
         model=model,
         inertia=_frozen(gyrostat),
         wheel_axes=_frozen(axes),
         wheel_inertia=_frozen(np.full(len(axes), wheels.inertia)),
-        wheel_qpos=_frozen(np.array([joint.qposadr[0] for joint in joints])),
-        wheel_dof=_frozen(np.array([joint.dofadr[0] for joint in joints])),
         torque_limit=wheels.torque_limit or np.inf,
         speed_limit=wheels.speed_limit or np.inf,
-        momentum=_sensor(model, "momentum"),
-        kinetic=_sensor(model, "kinetic"),
-        environment=_sensor(model, "environment"),
+        **_addresses(model, len(axes)),
     )
+
+
+def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
+    """Return ``vehicle`` on another compilation of it: the one that a log holds.
+
+    Raises:
+        KeyError: ``model`` lacks one of the vehicle's joints or sensors.
+    """
+    return replace(vehicle, model=model, **_addresses(model, len(vehicle.wheel_axes)))
 
 
 def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
@@ -143,7 +147,7 @@ def to_bytes(model: Any) -> bytes:
     """Return the compiled model as a gzipped MJB file: equal models give equal bytes."""
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
-    return gzip.compress(buffer.tobytes(), compresslevel=6, mtime=0)
+    return gzip.compress(buffer.tobytes(), compresslevel=3, mtime=0)
 
 
 def from_bytes(data: bytes) -> Any:
@@ -177,7 +181,7 @@ def _attach_wheel(spec: Any, table: PlantTable, index: int) -> None:
         mount.pos = wheels.positions[index]
     else:
         reach = _exit(spec.geom("bus_hull").size, axis) + _WHEEL_GAP
-        for geom in rotor.geoms:
+        for geom in part.geoms:
             geom.pos[2] += reach
     spec.attach(part, prefix=f"{name}_", frame=mount)
     rotor.name = joint.name = motor.name = motor.target = name
@@ -226,6 +230,15 @@ def _exit(half_size: Array, axis: Array) -> float:
     """Return how far from its centre [m] a ray along ``axis`` leaves a box of that half size."""
     with np.errstate(divide="ignore"):
         return float(np.min(half_size / np.abs(axis)))
+
+
+def _addresses(model: Any, wheels: int) -> dict[str, Any]:
+    joints = [model.joint(f"wheel_{index}") for index in range(wheels)]
+    return {
+        "wheel_qpos": _frozen(np.array([joint.qposadr[0] for joint in joints])),
+        "wheel_dof": _frozen(np.array([joint.dofadr[0] for joint in joints])),
+        **{name: _sensor(model, name) for name in ("momentum", "kinetic", "environment")},
+    }
 
 
 def _sensor(model: Any, name: str) -> slice:

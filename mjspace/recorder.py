@@ -45,7 +45,7 @@ class Recorder:
         model = assembly.vehicle.model
         compiled = plant.to_bytes(model)
         attachments = {
-            "model.mjb": ("application/octet-stream", compiled),
+            "model.mjb.gz": ("application/gzip", compiled),
             "scenario.toml": ("application/toml", to_toml(assembly.scenario).encode()),
             "foxglove_layout.json": ("application/json", foxglove_layout.layout()),
         }

@@ -54,7 +54,8 @@ def replay(
 ) -> Result:
     """Fly a log again from time ``start`` [s] into a new log, ``flight.mcap`` in ``out``.
 
-    Under another ``law``, whose files are looked up from ``folder``, its state begins at ``start``.
+    Under another ``law``, whose files are looked up from ``folder``, its state begins at ``start``,
+    and the checks of the logged law's signals are left out.
 
     Raises:
         InputError: no such log, time or law.
@@ -109,14 +110,16 @@ def assembly_of(
     table = tomllib.loads(log.attachment("scenario.toml").decode())
     scenario = validate(table, "the log's scenario")
     if law is not None:
-        scenario = scenario.model_copy(update={"law": law})
+        # What the logged law signals, another need not.
+        kept = [check for check in scenario.checks if not check.signal.startswith("law.")]
+        scenario = scenario.model_copy(update={"law": law, "checks": kept})
     with tempfile.TemporaryDirectory() as own:
         for role in SOURCES:
             if f"{role}.py" in log.attachments:
                 (Path(own) / f"{role}.py").write_bytes(log.attachment(f"{role}.py"))
         assembly = assemble(scenario, Path(own), law_folder=None if law is None else folder)
-        vehicle = plant.describe(plant.from_bytes(log.attachment("model.mjb")), scenario.plant)
-        yield dataclasses.replace(assembly, vehicle=vehicle)
+        model = plant.from_bytes(log.attachment("model.mjb.gz"))
+        yield dataclasses.replace(assembly, vehicle=plant.on_model(assembly.vehicle, model))
 
 
 def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = False) -> Start:
@@ -127,15 +130,15 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     """
     period = assembly.scenario.rates.control
     number = round(time / period)
-    near = {"start": (number - 0.5) * period, "end": (number + 0.5) * period}
-    row = log.read("/state", **near)
+    near = (number - 0.5) * period, (number + 0.5) * period
+    row = log.read("/state", None, *near)
     if len(row["time"]) != 1:
         raise InputError(f"t = {time:g} s is not in the log: it has {log.start:g} to {log.end:g} s")
     state = {name: values for name, values in row.items() if name != "time"}
     sensors = {n.removeprefix("sensor_"): v for n, v in state.items() if n.startswith("sensor_")}
     law_state: Any = None
     if not fresh_law:
-        seen, wanted = log.read("/measurement", **near), log.read("/reference", **near)
+        seen, wanted = log.read("/measurement", None, *near), log.read("/reference", None, *near)
         template = assembly.law.reset(
             Measurement(*(seen[name] for name in Measurement._fields)),
             Reference(*(wanted[name][0] for name in Reference._fields)),

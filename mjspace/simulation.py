@@ -14,7 +14,6 @@ from mjspace import attitude, environment
 from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Reference
 from mjspace.errors import FlightError
-from mjspace.plant import initial_state
 from mjspace.scenario import Scenario, whole_number
 from mjspace.tape import Block, Columns, Tape
 
@@ -45,7 +44,7 @@ def first_start(assembly: Assembly, members: Sequence[int]) -> Start:
     """Return time zero of the scenario for these members."""
     model = assembly.vehicle.model
     data = mujoco.MjData(model)
-    data.qpos, data.qvel = initial_state(assembly.vehicle, assembly.scenario.initial)
+    data.qpos, data.qvel = assembly.qpos, assembly.qvel
     data.userdata = assembly.userdata
     row = np.empty(mujoco.mj_stateSize(model, INTEGRATION))
     mujoco.mj_getState(model, data, row, INTEGRATION)
@@ -127,7 +126,7 @@ class _Flight:
         tape = Tape(first)
         control = self.assembly.scenario.rates.control
         end = min(first + BLOCK_PERIODS - 1, last)
-        references = self.assembly.reference.at(np.arange(first, end + 1) * control)
+        references = self.assembly.reference.at(np.arange(first, end + 1, dtype=float) * control)
         due = clock.monotonic() + BLOCK_SECONDS
         now = first * control
         try:

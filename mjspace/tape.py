@@ -120,7 +120,7 @@ class Tape:
             "/law": _fields(self.signals[:n]),
             "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
         }
-        time = (self.period + np.arange(n)) * assembly.scenario.rates.control
+        time = (self.period + np.arange(n, dtype=float)) * assembly.scenario.rates.control
         events = _saturation_events(time, np.array(self.saturated[:n], bool), saturated_before)
         return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
 

@@ -1,5 +1,6 @@
 """Judging logs made by hand, where every statistic is known."""
 
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -18,7 +19,9 @@ class Tape:
         time = np.arange(len(error)) / 10.0
         self._rows = {"time": time, "error": error[:, None], "rate": rate}
 
-    def blocks(self, topic, fields, start, end):
+    def blocks(
+        self, topic: str, fields: list[str], start: float, end: float | None
+    ) -> Iterator[dict[str, np.ndarray]]:
         time = self._rows["time"]
         for part in np.array_split(np.arange(len(time)), 2):
             inside = (time[part] >= start) & (time[part] <= (np.inf if end is None else end))

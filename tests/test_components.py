@@ -1,6 +1,7 @@
 """Finding and constructing laws and references from a scenario's tables."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ class Damper:
 '''
 
 
-def build(kind: str, folder: Path = Path(), **gains: object) -> object:
+def build(kind: str, folder: Path = Path(), **gains: Any) -> tuple[Any, Component]:
     component = Component(kind=kind, **gains)
     return construct(component, load_object(kind, folder), FACTS, folder)
 
