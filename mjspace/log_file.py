@@ -81,10 +81,14 @@ class LogFile:
         self._chunk_indexes = bytearray()
         self._error: OSError | None = None
         self._position = 0
-        self._file = path.open("wb", buffering=0)
-        self._put(head)
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="log")
         self._writing: deque[Future[None]] = deque()
+        self._file = path.open("wb", buffering=0)
+        try:
+            self._put(head)
+        except OSError:
+            self._file.close()
+            raise
 
     def add_chunk(self, parts: Sequence[Part]) -> None:
         """Have ``parts`` written as one chunk; waits when the disk is two chunks behind."""
@@ -109,8 +113,6 @@ class LogFile:
             self._file.close()
 
     def _write_chunk(self, parts: Sequence[Part]) -> None:
-        if self._error:
-            raise self._error  # what follows a torn chunk could never be found
         data, index, counts = encode(parts, self._position)
         self._put(data)
         self._chunk_indexes += record_bytes(index)
@@ -127,6 +129,8 @@ class LogFile:
 
     def _put(self, data: bytes) -> None:
         """Hand ``data`` to the operating system, all of it."""
+        if self._error:
+            raise self._error  # what follows a torn record could never be found
         rest = memoryview(data)
         try:
             while rest:

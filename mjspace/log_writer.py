@@ -83,8 +83,8 @@ class LogWriter:
         self._count += count
         self._last = int(stamps[-1])
         periodic = {topic: self._channels[topic] for topic in self._topics}
-        self._file.add_chunk([block(records, periodic, stamps), *self._pending])
-        self._pending = []
+        parts, self._pending = [block(records, periodic, stamps), *self._pending], []
+        self._file.add_chunk(parts)
 
     def write_transforms(self, time: Array, positions: Array, quaternions: Array) -> None:
         """Log the scene's bodies in ``world`` on /tf, with the next chunk.
@@ -117,9 +117,9 @@ class LogWriter:
         Raises:
             OSError: something could not be written.
         """
-        if self._pending:
-            self._file.add_chunk(self._pending)
-            self._pending = []
+        parts, self._pending = self._pending, []
+        if parts:
+            self._file.add_chunk(parts)
         self._file.flush()
 
     def close(self) -> None:

@@ -1,0 +1,71 @@
+"""Small logs with every kind of content, for the tests of the log."""
+
+from math import prod
+from pathlib import Path
+
+import numpy as np
+from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+
+from mjspace.contract import Array
+from mjspace.log_layout import Fields
+from mjspace.log_schema import Scene
+from mjspace.log_writer import LogWriter
+
+TOPICS: dict[str, Fields] = {
+    "/state": {"physics": (9,), "law_p": (2, 3), "sensor_none": (0,)},
+    "/truth": {"attitude": (4,), "attitude_error": ()},
+    "/law": {},
+}
+UNITS = {"/truth": {"attitude_error": "rad"}}
+METADATA = {"seed": "7", "integrator": "RK4", "note": "Grüße"}
+ATTACHMENTS = {
+    "scenario.toml": ("application/toml", b"duration = 1.0\n"),
+    "empty": ("text/plain", b""),
+}
+SCENE = Scene(
+    ("bus", "wheel_0"),
+    SceneUpdate(entities=[SceneEntity(id="bus")]).SerializeToString(),
+    "<robot name='mjspace'/>",
+)
+PERIODS_PER_SECOND = 1000
+BLOCKS = (7, 100, 1, 60)  # control periods
+
+
+def rows(first: int, count: int) -> tuple[Array, dict[str, dict[str, Array]]]:
+    """Return ``count`` control periods from number ``first`` on: the same numbers in any blocks."""
+    periods = np.arange(first, first + count)
+    values = {
+        topic: {
+            field: np.sin(
+                number * periods.reshape(count, *(1 for _ in shape))
+                + np.arange(prod(shape)).reshape(shape)
+            )
+            for number, (field, shape) in enumerate(fields.items(), start=len(topic))
+        }
+        for topic, fields in TOPICS.items()
+    }
+    return periods / PERIODS_PER_SECOND, values
+
+
+def create(path: Path) -> LogWriter:
+    return LogWriter(path, TOPICS, METADATA, ATTACHMENTS, SCENE, UNITS)
+
+
+def write_block(log: LogWriter, first: int, count: int) -> None:
+    """Log a block as a flight does: frames every tenth period and an event, then the periods."""
+    time, values = rows(first, count)
+    frames = time[::10]
+    turns = np.stack([np.cos(frames), 0 * frames, 0 * frames, np.sin(frames)], axis=-1)
+    places = np.stack([frames, -frames, 0 * frames], axis=-1)
+    log.write_transforms(frames, np.stack([places, 2 * places], 1), np.stack([turns, -turns], 1))
+    log.event(float(time[count // 2]), "WARNING", f"period {first + count // 2}")
+    log.write(time, values)
+
+
+def fly(path: Path) -> Path:
+    """Write a whole log of ``BLOCKS`` to ``path`` and return it."""
+    with create(path) as log:
+        for i, count in enumerate(BLOCKS):
+            write_block(log, sum(BLOCKS[:i]), count)
+    return path

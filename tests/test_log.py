@@ -1,0 +1,198 @@
+"""A log gives back what was written, bit for bit, in memory that does not grow with the flight."""
+
+import tracemalloc
+from pathlib import Path
+from time import sleep
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from log_samples import ATTACHMENTS, BLOCKS, METADATA, UNITS, create, fly, rows, write_block
+
+from mjspace.contract import Array
+from mjspace.log_chunk import encode
+from mjspace.log_layout import Fields, doubles
+from mjspace.log_reader import Log
+from mjspace.log_schema import PERIODIC, Scene
+from mjspace.log_writer import LogWriter
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return fly(tmp_path_factory.mktemp("log") / "flight.mcap")
+
+
+SHAPES = st.lists(st.integers(0, 3), max_size=3).map(tuple)
+NAMES = st.from_regex(r"[a-z][a-z0-9_]{0,8}", fullmatch=True).filter(lambda name: name != "time")
+FIELDS = st.dictionaries(NAMES, SHAPES, max_size=4)
+
+
+SPECIAL = np.array([np.nan, -np.nan, np.inf, -0.0, 5e-324, 1.7e308]).view(np.uint64)
+SIGNALLING_NAN = np.uint64(0x7FF0_0000_0000_0001)
+
+
+def any_bits(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    bits = rng.integers(2**64, size=shape, dtype=np.uint64)
+    special = rng.choice([*SPECIAL, SIGNALLING_NAN], size=shape)
+    return np.asarray(np.where(rng.random(shape) < 0.3, special, bits)).view(np.float64)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    topics=st.dictionaries(st.sampled_from(sorted(PERIODIC)), FIELDS, min_size=1),
+    counts=st.lists(st.integers(1, 5), min_size=1, max_size=4),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_every_bit_comes_back(
+    topics: dict[str, Fields],
+    counts: list[int],
+    seed: int,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(rng.integers(1, 10**12, size=sum(counts))) / 1e9
+    written = {
+        topic: {field: any_bits(rng, (len(time), *shape)) for field, shape in fields.items()}
+        for topic, fields in topics.items()
+    }
+    path = tmp_path_factory.mktemp("log") / "flight.mcap"
+    with LogWriter(path, topics, {}, {}, Scene((), b"", ""), {}) as log:
+        for end, count in zip(np.cumsum(counts), counts, strict=True):
+            part = slice(end - count, end)
+            values = {t: {f: v[part] for f, v in fields.items()} for t, fields in written.items()}
+            log.write(time[part], values)
+    read = Log(path)
+    assert (read.complete, len(read), read.start, read.end) == (True, len(time), time[0], time[-1])
+    assert read.topics == topics
+    for topic, fields in written.items():
+        columns = read.read(topic)
+        assert columns.pop("time").tobytes() == time.tobytes()
+        assert columns.keys() == fields.keys()
+        for field, column in fields.items():
+            assert columns[field].shape == column.shape
+            assert columns[field].tobytes() == column.tobytes()
+
+
+def test_what_describes_the_flight_comes_back(flown: Path) -> None:
+    log = Log(flown)
+    assert log.metadata == METADATA
+    assert {name: log.attachment(name) for name in log.attachments} == {
+        name: content for name, (_, content) in ATTACHMENTS.items()
+    }
+    assert log.units == {"/state": {}, "/law": {}, **UNITS}
+    ends = np.cumsum(BLOCKS)
+    middles = [end - count + count // 2 for end, count in zip(ends, BLOCKS, strict=True)]
+    assert log.events() == [(k / 1000, "WARNING", f"period {k}") for k in middles]
+
+
+@given(
+    window=st.tuples(st.integers(-2, 170), st.integers(-2, 170)),
+    every=st.sampled_from([1, 2, 7, 500]),
+)
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_a_window_holds_both_its_ends_and_every_nth_row_between(
+    window: tuple[int, int], every: int, flown: Path
+) -> None:
+    low, high = sorted(window)
+    time, values = rows(0, sum(BLOCKS))
+    chosen = slice(max(low, 0), high + 1 if high >= 0 else 0, every)
+    read = Log(flown).read("/state", ["law_p"], start=low / 1000, end=high / 1000, every=every)
+    assert list(read) == ["time", "law_p"]
+    np.testing.assert_array_equal(read["time"], time[chosen])
+    np.testing.assert_array_equal(read["law_p"], values["/state"]["law_p"][chosen])
+
+
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [(-1.0, 0), (0.0, 0), (0.00649, 6), (0.00651, 7), (0.1071, 107), (99.0, 167)],
+)
+def test_the_nearest_row_is_found_across_chunks(flown: Path, asked: float, found: int) -> None:
+    row = Log(flown).nearest("/truth", asked)
+    time, values = rows(0, sum(BLOCKS))
+    assert row["time"] == time[found]
+    np.testing.assert_array_equal(row["attitude"], values["/truth"]["attitude"][found])
+    assert row["attitude_error"] == values["/truth"]["attitude_error"][found]
+
+
+def test_reading_by_chunks_never_holds_the_log(tmp_path: Path) -> None:
+    def peak(count: int) -> int:
+        path = tmp_path / f"{count}.mcap"
+        tracemalloc.start()
+        with create(path) as log:
+            for i in range(count):
+                write_block(log, 1000 * i, 1000)
+        for block in Log(path).blocks("/state", every=10):
+            del block
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    # 40 blocks of 0.4 MB; the peaks differ by what happens to be in flight, two blocks at most.
+    assert peak(50) - peak(10) < 1_000_000
+
+
+def test_a_slow_disk_holds_up_the_flight_and_not_its_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = 0
+    ahead: list[int] = []
+
+    def slow(parts: Any, position: int) -> Any:
+        sleep(0.02)
+        ahead.append(written - len(ahead))
+        return encode(parts, position)
+
+    monkeypatch.setattr("mjspace.log_file.encode", slow)
+    with create(tmp_path / "flight.mcap") as log:
+        for i in range(8):
+            write_block(log, 10 * i, 10)
+            written += 1
+    assert max(ahead) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"time": np.array([0.0])}, "do not increase"),
+        ({"time": np.array([-1e-3])}, "starts at zero"),
+        ({"time": np.array([np.nan])}, "starts at zero"),
+        ({"attitude": np.zeros(4)}, r"/truth.attitude: shape \(4,\), wanted \(1, 4\)"),
+    ],
+)
+def test_what_cannot_be_logged_is_refused(
+    change: dict[str, Array], message: str, tmp_path: Path
+) -> None:
+    with create(tmp_path / "flight.mcap") as log:
+        write_block(log, 0, 1)
+        time, values = rows(1, 1)
+        values["/truth"]["attitude"] = change.get("attitude", values["/truth"]["attitude"])
+        with pytest.raises(ValueError, match=message):
+            log.write(change.get("time", time), values)
+    assert len(Log(tmp_path / "flight.mcap")) == 1
+
+
+@pytest.mark.parametrize("field", ["time", "2nd", "größe", "with space"])
+def test_a_field_needs_a_name_that_protobuf_has_room_for(field: str) -> None:
+    with pytest.raises(ValueError, match=field):
+        doubles({field: (3,)})
+
+
+def test_an_unknown_topic_field_or_attachment_is_named_with_those_there_are(
+    flown: Path, tmp_path: Path
+) -> None:
+    log = Log(flown)
+    with pytest.raises(ValueError, match=r"no topic '/velocity' .*: have /state, /truth, /law"):
+        log.read("/velocity")
+    with pytest.raises(
+        ValueError, match=r"no field 'error' on /truth .*: have attitude, attitude_error"
+    ):
+        log.read("/truth", ["error"])
+    with pytest.raises(ValueError, match=r"no attachment 'model' .*: have scenario.toml, empty"):
+        log.attachment("model")
+    with pytest.raises(ValueError, match="no topic '/thrust': have /state"):
+        LogWriter(tmp_path / "x.mcap", {"/thrust": {}}, {}, {}, Scene((), b"", ""), {})
+    assert not (tmp_path / "x.mcap").exists()

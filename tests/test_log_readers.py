@@ -1,0 +1,144 @@
+"""Readers that know nothing of mjspace find everything in a log: ``mcap``, protobuf and Rerun."""
+
+import subprocess
+import sys
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from log_samples import ATTACHMENTS, BLOCKS, METADATA, SCENE, TOPICS, UNITS, fly, rows
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.stream_reader import StreamReader
+from mcap_protobuf.decoder import DecoderFactory
+
+RERUN = Path(sys.executable).with_name("rerun")
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return fly(tmp_path_factory.mktemp("log") / "flight.mcap")
+
+
+@pytest.fixture(scope="module")
+def messages(flown: Path) -> dict[str, list[Any]]:
+    found = defaultdict(list)
+    with flown.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        topics = [*TOPICS, "/tf", "/scene", "/events"]
+        for _, channel, message, decoded in reader.iter_decoded_messages(topics):
+            found[channel.topic].append((message, decoded))
+    return found
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_protobuf_decodes_the_numbers_that_were_written(
+    topic: str, messages: dict[str, list[Any]]
+) -> None:
+    time, values = rows(0, sum(BLOCKS))
+    assert len(messages[topic]) == sum(BLOCKS)
+    for k, (message, decoded) in enumerate(messages[topic]):
+        assert message.sequence == k
+        assert message.log_time == message.publish_time == round(time[k] * 1e9)
+        for field, column in values[topic].items():
+            assert np.ravel(getattr(decoded, field)).tobytes() == column[k].tobytes()
+
+
+def test_a_number_is_a_plot_and_not_an_array_of_one(messages: dict[str, list[Any]]) -> None:
+    assert isinstance(messages["/truth"][0][1].attitude_error, float)
+
+
+def test_frames_are_where_the_bodies_were(messages: dict[str, list[Any]]) -> None:
+    for message, decoded in messages["/tf"]:
+        bus, wheel = decoded.transforms
+        t = message.log_time / 1e9
+        for frame, name, factor in ((bus, "bus", 1.0), (wheel, "wheel_0", 2.0)):
+            assert (frame.parent_frame_id, frame.child_frame_id) == ("world", name)
+            assert frame.timestamp.ToNanoseconds() == message.log_time
+            place = frame.translation
+            assert (place.x, place.y, place.z) == (factor * t, -factor * t, 0.0)
+        sign = bus.rotation.w / wheel.rotation.w
+        assert sign == -1.0
+        assert (bus.rotation.w, bus.rotation.z) == (np.cos(t), np.sin(t))
+        assert bus.rotation.x == bus.rotation.y == 0.0
+    stamps = [message.log_time for message, _ in messages["/tf"]]
+    assert len(stamps) == sum(-(-count // 10) for count in BLOCKS)
+
+
+def test_the_scene_and_the_events_are_foxgloves(messages: dict[str, list[Any]]) -> None:
+    ((message, scene),) = messages["/scene"]
+    assert (message.log_time, [entity.id for entity in scene.entities]) == (0, ["bus"])
+    events = [decoded for _, decoded in messages["/events"]]
+    assert [event.level for event in events] == [3] * len(BLOCKS)  # WARNING
+    assert events[0].message == "period 3"
+    assert events[0].timestamp.ToNanoseconds() == 3_000_000
+
+
+def test_the_robot_description_is_a_ros_string(flown: Path) -> None:
+    with flown.open("rb") as file:
+        ((schema, channel, message),) = make_reader(file).iter_messages("/robot_description")
+    assert schema is not None
+    assert (schema.name, schema.encoding, schema.data) == (
+        "std_msgs/msg/String",
+        "ros2msg",
+        b"string data",
+    )
+    assert channel.message_encoding == "cdr"
+    # XCDR1: 00 01 is little endian; a string's length counts its final zero.
+    assert message.data[:4] == b"\0\1\0\0"
+    assert int.from_bytes(message.data[4:8], "little") == len(message.data) - 8
+    assert message.data[8:] == SCENE.urdf.encode() + b"\0"
+
+
+def test_the_summary_agrees_with_the_data(flown: Path) -> None:
+    with flown.open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        assert [(note.name, note.metadata) for note in reader.iter_metadata()] == [
+            ("mjspace", METADATA)
+        ]
+        assert {a.name: (a.media_type, a.data) for a in reader.iter_attachments()} == ATTACHMENTS
+        assert summary is not None
+        assert summary.statistics is not None
+        counts: Counter[int] = Counter()
+        # The slow way through the whole file checks every checksum and every length on its way.
+        file.seek(0)
+        for _, channel, _ in NonSeekingReader(file, validate_crcs=True).iter_messages():
+            counts[channel.id] += 1
+    statistics = summary.statistics
+    assert statistics.channel_message_counts == counts
+    assert statistics.message_count == sum(counts.values())
+    assert statistics.message_end_time == (sum(BLOCKS) - 1) * 1_000_000
+    assert statistics.chunk_count == len(summary.chunk_indexes) == len(BLOCKS)
+    channels = {channel.topic: channel for channel in summary.channels.values()}
+    assert channels["/state"].metadata["shape.law_p"] == "2,3"
+    assert channels["/truth"].metadata["unit.attitude_error"] == UNITS["/truth"]["attitude_error"]
+
+
+def test_all_that_explains_the_data_comes_before_it(flown: Path) -> None:
+    with flown.open("rb") as file:
+        order = [type(r).__name__ for r in StreamReader(file, emit_chunks=True).records]
+    first = order.index("Chunk")
+    assert set(order[:first]) == {"Header", "Metadata", "Schema", "Channel", "Attachment"}
+    assert not {"Schema", "Channel", "Attachment"} & set(order[first : order.index("DataEnd")])
+
+
+def test_the_message_indexes_lead_to_the_messages(flown: Path) -> None:
+    # Reading backwards in time goes by the indexes alone.
+    with flown.open("rb") as file:
+        reader = make_reader(file)
+        found = [message.sequence for *_, message in reader.iter_messages("/truth", reverse=True)]
+    assert found == list(range(sum(BLOCKS)))[::-1]
+
+
+@pytest.mark.skipif(not RERUN.exists(), reason="rerun-sdk is not installed")
+def test_rerun_finds_nothing_wrong(flown: Path) -> None:
+    check = subprocess.run(
+        [RERUN, "mcap", "check", "--full", flown], capture_output=True, text=True, check=True
+    )
+    # It returns 0 also when it has found problems: its table says so.
+    table = [line.split() for line in check.stdout.splitlines() if " /" in line]
+    assert {row[3]: row[0] for row in table} == dict.fromkeys(
+        [*TOPICS, "/tf", "/scene", "/events", "/robot_description"], "ok"
+    )
