@@ -64,6 +64,9 @@ def test_elements_mean_what_they_say() -> None:
     np.testing.assert_allclose(orbit_position(raised, 0.0), [0.0, 8e6, 0.0], atol=4e-9)
     later = polar.model_copy(update={"periapsis": np.pi / 2})
     np.testing.assert_allclose(orbit_position(later, 0.0), [0.0, 0.0, 8e6], atol=4e-9)
+    aside = polar.model_copy(update={"true_anomaly": np.pi / 2})
+    parameter = 1e7 * (1.0 - 0.2**2)
+    np.testing.assert_allclose(orbit_position(aside, 0.0), [0.0, 0.0, parameter], atol=4e-9)
     beyond = polar.model_copy(update={"true_anomaly": np.pi})
     np.testing.assert_allclose(orbit_position(beyond, 0.0), [-12e6, 0.0, 0.0], atol=4e-9)
 
