@@ -75,10 +75,7 @@ def doubles(fields: Fields) -> Layout:
         if not (name.isidentifier() and name.isascii()) or name == "time":
             raise ValueError(f"{name!r} cannot name a logged field: write a word other than 'time'")
         size = 8 * prod(shape)
-        if not shape:
-            template += _tag(number, _DOUBLE)
-        elif size:
-            template += _tag(number, _BYTES) + _varint(size)
+        template += _tag(number, _BYTES) + _varint(size) if shape else _tag(number, _DOUBLE)
         offsets.append(len(template))
         template += bytes(size)
     return _layout(template, {name: ("<f8", shape) for name, shape in fields.items()}, offsets)

@@ -14,7 +14,7 @@ from mjspace.log_writer import LogWriter
 
 TOPICS: dict[str, Fields] = {
     "/state": {"physics": (9,), "law_p": (2, 3), "sensor_none": (0,)},
-    "/truth": {"attitude": (4,), "attitude_error": ()},
+    "/truth": {"attitude": (4,), "rate": (3,), "attitude_error": ()},
     "/law": {},
 }
 UNITS = {"/truth": {"attitude_error": "rad"}}

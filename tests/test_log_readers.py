@@ -1,7 +1,10 @@
 """Readers that know nothing of mjspace find everything in a log: ``mcap``, protobuf and Rerun."""
 
+import re
+import struct
 import subprocess
 import sys
+import zlib
 from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any
@@ -9,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from log_samples import ATTACHMENTS, BLOCKS, METADATA, SCENE, TOPICS, UNITS, fly, rows
+from mcap.opcode import Opcode
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
@@ -116,6 +120,29 @@ def test_the_summary_agrees_with_the_data(flown: Path) -> None:
     assert channels["/truth"].metadata["unit.attitude_error"] == UNITS["/truth"]["attitude_error"]
 
 
+def test_the_summarys_checksum_covers_it_and_the_footer(flown: Path) -> None:
+    # The specification: from the summary's first byte to the last before the checksum itself, which
+    # the closing magic follows.
+    content = flown.read_bytes()
+    checksum, magic = content[-12:-8], content[-8:]
+    start = int.from_bytes(content[-28:-20], "little")
+    assert magic == content[:8]
+    assert int.from_bytes(checksum, "little") == zlib.crc32(content[start:-12])
+
+
+def test_the_summary_says_where_each_message_index_is(flown: Path) -> None:
+    with flown.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        for chunk in summary.chunk_indexes:
+            end = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
+            for channel, place in sorted(chunk.message_index_offsets.items(), reverse=True):
+                file.seek(place)
+                opcode, length, found = struct.unpack("<BQH", file.read(11))
+                assert (opcode, found) == (Opcode.MESSAGE_INDEX, channel)
+                assert place + 9 + length <= end
+
+
 def test_all_that_explains_the_data_comes_before_it(flown: Path) -> None:
     with flown.open("rb") as file:
         order = [type(r).__name__ for r in StreamReader(file, emit_chunks=True).records]
@@ -130,6 +157,18 @@ def test_the_message_indexes_lead_to_the_messages(flown: Path) -> None:
         reader = make_reader(file)
         found = [message.sequence for *_, message in reader.iter_messages("/truth", reverse=True)]
     assert found == list(range(sum(BLOCKS)))[::-1]
+
+
+def test_the_examples_on_the_page_run(
+    flown: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = Path(__file__).parents[1] / "docs" / "log.md"
+    ours, plain = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    monkeypatch.chdir(flown.parent)
+    exec(ours, {})
+    assert f"{sum(BLOCKS)} 0.0 0.167 True" in capsys.readouterr().out
+    exec(plain, {})
+    assert len(capsys.readouterr().out.splitlines()) == sum(BLOCKS)
 
 
 @pytest.mark.skipif(not RERUN.exists(), reason="rerun-sdk is not installed")
