@@ -8,7 +8,6 @@ import numba
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.scenario import Wheels
 
 
 @dataclass(frozen=True)
@@ -26,9 +25,11 @@ class ReactionWheels:
     """Largest speed relative to the bus [rad/s]."""
     allocation: Array = field(init=False, repr=False)
     """Motor torques for each unit of torque on the bus, shape (n, 3): -pinv(axes^T)."""
+    _limits: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "allocation", -np.linalg.pinv(self.axes.T))
+        object.__setattr__(self, "_limits", np.array([self.torque_limit, self.speed_limit]))
 
     def motor_torque(self, torque: Array, wheel_speed: Array) -> tuple[Array, Array]:
         """Return (ctrl, saturated), each of shape (..., n).
@@ -41,10 +42,11 @@ class ReactionWheels:
         period adds. ``saturated`` is 1.0 for a wheel that does not get the torque allotted to it,
         else 0.0.
         """
-        ctrl, saturated = _motor_torque(
-            torque, wheel_speed, self.allocation, self.torque_limit, self.speed_limit
+        # Past Numba's wrapper, and with both limits in one array: 1.6 us a call, not 2.6.
+        given: tuple[Array, Array] = _motor_torque.ufunc(
+            torque, wheel_speed, self.allocation, self._limits
         )
-        return ctrl, saturated
+        return given
 
     def torque_on_bus(self, ctrl: Array) -> Array:
         """Return the motors' reaction on the bus [N m], body axes, shape (..., 3)."""
@@ -52,31 +54,16 @@ class ReactionWheels:
         return torque
 
 
-def reaction_wheels(table: Wheels) -> ReactionWheels:
-    """Return the wheels of a scenario's table; their axes need not be of unit length there."""
-    axes = np.array(table.axes, dtype=float)
-    return ReactionWheels(
-        axes=axes / np.linalg.norm(axes, axis=1, keepdims=True),
-        torque_limit=inf if table.torque_limit is None else table.torque_limit,
-        speed_limit=inf if table.speed_limit is None else table.speed_limit,
-    )
-
-
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
 @numba.guvectorize(
-    ["void(f8[:], f8[:], f8[:, :], f8, f8, f8[:], f8[:])"],
-    "(k),(n),(n,k),(),()->(n),(n)",
+    ["void(f8[:], f8[:], f8[:, :], f8[:], f8[:], f8[:])"],
+    "(k),(n),(n,k),(m)->(n),(n)",
     cache=True,
 )
 def _motor_torque(
-    torque: Any,
-    speed: Any,
-    allocation: Any,
-    torque_limit: Any,
-    speed_limit: Any,
-    ctrl: Any,
-    saturated: Any,
+    torque: Any, speed: Any, allocation: Any, limits: Any, ctrl: Any, saturated: Any
 ) -> None:
+    torque_limit, speed_limit = limits[0], limits[1]
     for i in range(speed.size):
         wanted = 0.0
         for k in range(torque.size):

@@ -1,6 +1,6 @@
 """Reaction wheels: their reaction, its sharing, and the limits of torque and speed."""
 
-from math import inf, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mjspace.actuators import ReactionWheels, reaction_wheels
-from mjspace.scenario import Wheels
+from mjspace.actuators import ReactionWheels
 
 PYRAMID = [[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]]
 SKEW = [[1, 0.2, 0], [0, 1, 0.3], [0.1, 0, 1]]
@@ -20,7 +19,8 @@ components = st.integers(-(10**9), 10**9).map(lambda micro: 1e-6 * micro)  # non
 
 
 def wheels(axes: Any = LAYOUTS["orthogonal"], **limits: Any) -> ReactionWheels:
-    return reaction_wheels(Wheels(axes=axes, **limits))
+    rows = np.array(axes, dtype=float)
+    return ReactionWheels(rows / np.linalg.norm(rows, axis=1, keepdims=True), **limits)
 
 
 def test_the_bus_is_turned_by_the_reaction_of_the_wheel() -> None:
@@ -130,12 +130,3 @@ def test_a_vehicle_gets_the_same_bits_alone_and_in_a_batch(axes: Any) -> None:
         assert one.tobytes() == ctrl[row].tobytes()
         assert flag.tobytes() == saturated[row].tobytes()
         assert team.torque_on_bus(one).tobytes() == bus[row].tobytes()
-
-
-def test_the_table_s_axes_are_normalized_and_its_missing_limits_are_none() -> None:
-    team = wheels([[0, 0, 2]])
-    assert team.axes.tolist() == [[0.0, 0.0, 1.0]]
-    assert (team.torque_limit, team.speed_limit) == (inf, inf)
-    limited = wheels(torque_limit="200 mN m", speed_limit="6000 rpm")
-    assert limited.torque_limit == pytest.approx(0.2)
-    assert limited.speed_limit == pytest.approx(200.0 * np.pi)

@@ -170,17 +170,31 @@ def test_streams_are_independent_of_each_other() -> None:
     mixed = columns.T @ columns / count - np.diag(np.mean(columns**2, axis=0))
     assert np.abs(mixed).max() < FIVE_SIGMA / np.sqrt(count)
 
-    # noise, walk and bias of one sensor; another seed; an index and its neighbour
-    parts = [normals(7, [0], (1, part), 3) for part in range(3)] + [normals(8, [0], (1, 0), 3)]
-    drawn = np.concatenate([[part(j)[0] for j in range(count)] for part in parts], axis=1)
-    mixed = drawn.T @ drawn / count - np.diag(np.mean(drawn**2, axis=0))
-    assert np.abs(mixed).max() < FIVE_SIGMA / np.sqrt(count)
+
+def test_noise_bias_and_walk_of_a_sensor_are_independent() -> None:
+    vehicles, period = 2000, 1e-3
+    alike = {"noise": 1.0, "bias": 1.0, "bias_walk": 1.0 / np.sqrt(period)}
+    first, second = reports(suite(range(vehicles), rate=alike), "rate", 2, vehicles)
+    spread = FIVE_SIGMA * np.sqrt(2.0 / first.size)
+    # b + n_0, then b + n_1 + w_1, where each has variance 1
+    assert abs(first.var() / 2.0 - 1.0) < spread
+    assert abs((second - first).var() / 3.0 - 1.0) < spread
+
+
+def test_the_errors_of_a_sample_depend_on_its_number_only() -> None:
+    fast, slow = suite(rate={"noise": 1.0}), suite(rate={"noise": 1.0, "period": 3e-3})
+    truth = still()
+    _, often = fly(fast, lambda _: truth, range(10))
+    _, seldom = fly(slow, lambda _: truth, range(0, 30, 3))
+    assert_same_bits([m.rate for m in often], [m.rate for m in seldom])
 
 
 def test_normals_do_not_depend_on_what_was_asked_before() -> None:
     forth, back = normals(3, [4], (0, 1), 2), normals(3, [4], (0, 1), 2)
     indices = [0, 1, 255, 256, 1000, 10**9]
     assert_same_bits([forth(j) for j in indices], [back(j) for j in indices[::-1]][::-1])
+    drawn = np.stack([forth(j) for j in range(600)])
+    assert np.unique(drawn).size == drawn.size
     with pytest.raises(ValueError, match="read-only"):
         forth(0)[:] = 0.0
 
@@ -250,10 +264,11 @@ def test_a_report_is_the_newest_sample_that_is_old_enough(
     rates = Rates(physics=1e-3, control=control * 1e-3)
     late = {"period": period * 1e-3, "delay": delay * period * 1e-3}
     sensors = suite(rates=rates, attitude=late, rate=late, wheel_speed=late)
-    if not sensors.ticks:
-        assert delay == 0
+    # a sample at every control instant is the truth there, and needs no sensor
+    held = delay > 0 or control % period > 0
+    assert sensors.ticks == ({period} if held else set())
+    if not held:
         return
-    assert sensors.ticks == {period}
     _, seen = fly(sensors, moving, range(60))
     for step, measurement in enumerate(seen):
         # Truth is a function of the step, so a report tells which step it shows.
