@@ -1,1 +1,22 @@
 """Its presence puts this folder on the path: ``from oracle import fly`` works in every test."""
+
+from pathlib import Path
+
+import pytest
+
+from mjspace.flight import run
+
+
+@pytest.fixture(scope="session")
+def pictured_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A second of the adaptive law, in orbit, disturbed, with wheels that saturate: to draw."""
+    overrides = (
+        "duration=1",
+        # Of a body that can exist: the papers' own warns.
+        "plant.gyrostat_inertia=[[15, 1, 1], [1, 12, 1], [1, 1, 18]]",
+        "plant.wheels.torque_limit=5",
+        "environment.orbit={semi_major_axis='6871 km', inclination='51 deg'}",
+        "environment.torques=[{bias=[0.01, 0, 0]}]",
+    )
+    folder = tmp_path_factory.mktemp("pictured")
+    return run("contraction-adaptive", overrides=overrides, out=folder).path

@@ -1,0 +1,59 @@
+"""The bounds of a scenario's checks, as lines over their windows on the panel of their signal."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from mjspace.log_reader import Log
+from mjspace.panels import Panel
+from mjspace.scenario import Check
+
+_SHORTEST = 0.05  # of the log: a bound on one instant, drawn so that it is seen
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A horizontal line."""
+
+    text: str
+    value: float
+    """In the panel's unit."""
+    start: float
+    """Of the window [s]."""
+    end: float
+    upper: bool
+    """Whether what is judged must stay below it."""
+    component: int
+    """Of the signal's."""
+
+
+def bounds(panel: Panel, checks: Sequence[Check], log: Log) -> Iterator[Bound]:
+    """Yield the bounds that can be drawn on ``panel``.
+
+    Those of another signal cannot, nor those of an error from a target, of a vector's norm, and of
+    a drift from a later instant than the panel's.
+    """
+    shape = log.topics[panel.topic][panel.field]
+    for check in checks:
+        name, _, rest = check.signal.removeprefix("/").partition("[")
+        component = int(rest.rstrip("]")) if rest else 0
+        is_drift = check.statistic == "drift"
+        if (
+            f"/{name}" != f"{panel.topic}.{panel.field}"
+            or panel.index not in (None, component)
+            or check.target is not None
+            or is_drift != panel.drift
+            or (is_drift and check.start > log.start)
+            or not (rest or is_drift or shape in ((), (1,)))
+        ):
+            continue
+        end = log.end if check.end is None else min(check.end, log.end)
+        start = end if check.statistic == "final" else min(check.start, end)
+        start = min(start, end - _SHORTEST * (log.end - log.start))
+        for sign, limit in (("<", check.below), (">", check.above)):
+            if limit is None:
+                continue
+            value = panel.scale * limit
+            text = f"{check.statistic} {sign} {value:.3g}"
+            yield Bound(text, value, start, end, sign == "<", component)
+            if check.statistic == "peak":
+                yield Bound(text, -value, start, end, sign == ">", component)

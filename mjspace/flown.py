@@ -1,0 +1,17 @@
+"""The scenario that a log says was flown."""
+
+import tomllib
+
+from mjspace.loading import validate
+from mjspace.log_reader import Log
+from mjspace.scenario import Scenario
+
+
+def scenario_of(log: Log) -> Scenario:
+    """Return the scenario as flown, with every default and gain written out.
+
+    Raises:
+        ValueError: the log does not hold it, or it is not valid for this version of mjspace.
+    """
+    table = tomllib.loads(log.attachment("scenario.toml").decode())
+    return validate(table, f"the scenario in {log.path}")

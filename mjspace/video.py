@@ -1,0 +1,69 @@
+"""A video as it is encoded: frames in one by one, an H.264 file in MP4 out."""
+
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import av
+import numpy as np
+from av.video.reformatter import Colorspace
+from numpy.typing import NDArray
+
+Frame = NDArray[np.uint8]
+"""An image, shape (height, width, 3), RGB, first row at the top."""
+
+BT709 = 1  # H.264's number for it, ITU-T H.273 table 2
+_OPTIONS = {"preset": "veryfast", "crf": "20"}
+
+
+class Video:
+    """An open MP4 file that any player and browser shows; deleted if it could not be finished."""
+
+    def __init__(self, path: Path, size: tuple[int, int], rate: float) -> None:
+        """Create the file for frames of ``size`` (width, height), ``rate`` of them a second.
+
+        Raises:
+            OSError: the file cannot be written.
+            ValueError: a width or height that is odd.
+        """
+        width, height = size
+        if width % 2 or height % 2:
+            even = f"{width + width % 2}x{height + height % 2}"
+            raise ValueError(
+                f"size {width}x{height}: a video's width and height must be even, as in {even}"
+            )
+        self._path = path
+        # The index before the pictures: playable before it is loaded whole.
+        self._file = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
+        self._stream = self._file.add_stream(
+            "libx264", rate=Fraction(rate).limit_denominator(1001), options=_OPTIONS
+        )
+        self._stream.width, self._stream.height = width, height
+        self._stream.pix_fmt = "yuv420p"
+        # Without these players guess the colours by the picture's size.
+        context = self._stream.codec_context
+        context.colorspace = context.color_primaries = context.color_trc = BT709
+
+    def write(self, frame: Frame) -> None:
+        """Append a frame."""
+        picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
+        picture = picture.reformat(format="yuv420p", dst_colorspace=Colorspace.ITU709)
+        self._file.mux(self._stream.encode(picture))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None:
+                self._file.mux(self._stream.encode(None))
+        finally:
+            self._file.close()
+            if error is not None:
+                self._path.unlink(missing_ok=True)
