@@ -18,9 +18,10 @@ format: .venv/dev.done
 	$(bin)/ruff check --fix
 	$(bin)/ruff format
 
+# Who can develop can also fly.
 .venv/%.done: pyproject.toml constraints.txt tools/setup
 	tools/setup $*
-	touch .venv/run.done $@  # who can develop can also fly
+	touch .venv/run.done $@
 
 # One set of versions for every Python, so that a flight is the same everywhere.
 constraints: .venv/dev.done
