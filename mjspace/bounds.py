@@ -53,7 +53,7 @@ def bounds(panel: Panel, checks: Sequence[Check], log: Log) -> Iterator[Bound]:
             if limit is None:
                 continue
             value = panel.scale * limit
-            text = f"{check.statistic} {sign} {value:.3g}"
+            text = f"{check.statistic} {sign} {value:.4g}"
             yield Bound(text, value, start, end, sign == "<", component)
             if check.statistic == "peak":
                 yield Bound(text, -value, start, end, sign == ">", component)

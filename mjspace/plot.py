@@ -9,6 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from mjspace.bounds import Bound, bounds
 from mjspace.flown import scenario_of
@@ -85,6 +86,7 @@ def figure(log: Log, signals: Sequence[str] = ()) -> Figure:
         colors = _colors(one)
         _draw(axes, one, colors)
         for bound in bounds(one.panel, scenario.checks, log):
+            axes.margins(y=0.16)  # room for the bound's text
             _mark(axes, bound, colors[bound.component if one.panel.index is None else 0])
         # Saturation, an early end, a check that failed: ticks along the bottom.
         axes.plot(
@@ -160,6 +162,7 @@ def _mark(axes: Any, bound: Bound, color: str) -> None:
         va="bottom" if bound.upper else "top",
         fontsize=7,
         color=color,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
     )
 
 
