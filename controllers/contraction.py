@@ -9,7 +9,7 @@ which sign a sensor reports.
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -95,6 +95,8 @@ class Ideal:
     p = H w + sum a Jw (a.w + Omega): equal on a torque-free vehicle, and right under any torque.
     """
 
+    batched: ClassVar[bool] = True
+
     inertia: Array = gain("kg m^2", (3, 3))
     """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
     wheel_axes: Array = gain(shape=(None, 3))
@@ -136,6 +138,8 @@ class Gradient:
     Equations (4.2) and (4.21); ga stays above zero where the paper prints zero (erratum 19). The
     estimate of hI assumes a constant total momentum. Explicit Euler at the control period.
     """
+
+    batched: ClassVar[bool] = True
 
     control_period: float = gain("s")
     """Time from one step to the next."""
@@ -181,6 +185,8 @@ class Adaptive:
     2.33e-2 against 2.32e-2 in continuous time. The filter sees the torque within its limit, so the
     limit must not be above what the actuators give.
     """
+
+    batched: ClassVar[bool] = True
 
     control_period: float = gain("s")
     """Time from one step to the next."""

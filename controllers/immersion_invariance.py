@@ -9,7 +9,7 @@ go are turned through, even if 1.3 rad the other way would do (erratum 12). The 
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, pi, sin
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numba import guvectorize, njit
@@ -52,6 +52,8 @@ class ImmersionInvariance:
     The torque H J^-1 (v - J' w) - p x w, v = x_d'' + (K + Gamma) x_e' + Gamma K x_e, makes
     z' = -Gamma z and x_e' = -K x_e - z. K and Gamma may be exchanged (erratum 8).
     """
+
+    batched: ClassVar[bool] = True
 
     inertia: Array = gain("kg m^2", (3, 3))
     """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""

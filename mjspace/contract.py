@@ -39,7 +39,8 @@ class Law(Protocol):
 
     ``state``, ``command`` and ``signals`` are named tuples of float64 arrays whose leading axes are
     those of the measurement; they are logged under their field names, so their shapes never change
-    during a flight. A command for reaction wheels has a field ``torque``: the torque on the bus
+    during a flight. A law that says ``batched = True`` handles any leading axes; another sees the
+    arrays of one vehicle and is flown one by one. A command for reaction wheels has a field ``torque``: the torque on the bus
     [N m], body axes, shape (..., 3).
     """
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from mjspace.flight import Result
@@ -20,10 +21,10 @@ def print_result(result: Result) -> None:
         table.add_column("verdict")
         for verdict in result.verdicts:
             word = "[green]PASS[/]" if verdict.passed else "[bold red]FAIL[/]"
-            table.add_row(verdict.check.name, f"{verdict.measured:.4g}", verdict.bound, word)
+            table.add_row(escape(verdict.check.name), f"{verdict.measured:.4g}", verdict.bound, word)
         console.print(table)
     if result.trouble:
-        console.print(f"[bold red]ended early:[/] {result.trouble}", highlight=False)
+        console.print(f"[bold red]ended early:[/] {escape(result.trouble)}", highlight=False)
 
 
 def result_data(result: Result) -> dict[str, Any]:
@@ -73,7 +74,7 @@ def print_log(log: Log) -> None:
     console.print(f"{log.start:g} to {log.end:g} s, {whole}", highlight=False)
     table = Table(box=None, pad_edge=False, show_header=False)
     for key, value in log.metadata.items():
-        table.add_row(key, value)
+        table.add_row(key, escape(value))
     for topic, fields in log.topics.items():
         listed = (f"{name} {'x'.join(map(str, shape)) or 1}" for name, shape in fields.items())
         table.add_row(topic, ", ".join(listed))

@@ -1,0 +1,5 @@
+"""``python -m mjspace``."""
+
+from mjspace.cli import main
+
+main()
