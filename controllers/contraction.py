@@ -13,16 +13,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, gain
+from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
 
 from . import contraction_kernels as kernels
-
-
-class Command(NamedTuple):
-    """What the laws ask for."""
-
-    torque: Array
-    """On the bus [N m], body axes, (..., 3)."""
 
 
 class IdealState(NamedTuple):
@@ -42,10 +35,9 @@ class IdealSignals(NamedTuple):
 
 
 class GradientState(NamedTuple):
-    """Memory of the gradient law."""
+    """Memory of the gradient law: as the ideal law's, and its estimates."""
 
     attitude: Array
-    """As in the ideal law's."""
     theta_hat: Array
     """Estimates of m11 m12 m13 m22 m23 m33 [kg m^2] and of the momentum hI [N m s], (..., 9)."""
 
@@ -59,12 +51,10 @@ class GradientSignals(NamedTuple):
 
 
 class AdaptiveState(NamedTuple):
-    """Memory of the adaptive law."""
+    """Memory of the adaptive law: as the gradient law's, and what it has gathered."""
 
     attitude: Array
-    """As in the ideal law's."""
     theta_hat: Array
-    """As in the gradient law's."""
     g: Array
     """Z times the estimates' error, known without knowing the error, (..., 9)."""
     Z: Array
@@ -119,12 +109,12 @@ class Ideal:
 
     def step(
         self, state: IdealState, time: float, measurement: Measurement, reference: Reference
-    ) -> tuple[IdealState, Command, IdealSignals]:
+    ) -> tuple[IdealState, TorqueCommand, IdealSignals]:
         """Return the next state, the torque and the errors."""
         seen, rate, wheel_speed = measurement
         vehicle = (wheel_speed, self.inertia, self.wheel_axes, self.wheel_inertia, self._gains)
         torque, e, wd, attitude = kernels.ideal(seen, rate, *reference, *state, *vehicle)
-        return IdealState(attitude), Command(torque), IdealSignals(e, wd)
+        return IdealState(attitude), TorqueCommand(torque), IdealSignals(e, wd)
 
     @cached_property
     def _gains(self) -> Array:
@@ -153,8 +143,8 @@ class Gradient:
     """Largest command on each axis."""
 
     def __post_init__(self) -> None:
-        positive = ("rate_gain", "attitude_gain", "adaptation_gain", "torque_limit")
-        _require_positive(self, "control_period", *positive)
+        _require_positive(self, "control_period", "rate_gain", "attitude_gain")
+        _require_positive(self, "adaptation_gain", "torque_limit")
 
     def reset(self, measurement: Measurement, reference: Reference) -> GradientState:
         """Return the state that knows nothing, on the branch nearer to the reference."""
@@ -163,11 +153,11 @@ class Gradient:
 
     def step(
         self, state: GradientState, time: float, measurement: Measurement, reference: Reference
-    ) -> tuple[GradientState, Command, GradientSignals]:
+    ) -> tuple[GradientState, TorqueCommand, GradientSignals]:
         """Return the next state, the torque, the errors and the estimates."""
         seen, rate, _ = measurement
         torque, e, wd, *after = kernels.gradient(seen, rate, *reference, *state, self._gains)
-        return GradientState(*after), Command(torque), GradientSignals(e, wd, state.theta_hat)
+        return GradientState(*after), TorqueCommand(torque), GradientSignals(e, wd, state.theta_hat)
 
     @cached_property
     def _gains(self) -> Array:
@@ -206,9 +196,8 @@ class Adaptive:
     """Largest command on each axis."""
 
     def __post_init__(self) -> None:
-        positive = ("filter_bandwidth", "adaptation_coupling", "adaptation_gain")
-        _require_positive(self, "control_period", "rate_gain", "attitude_gain", *positive)
-        _require_positive(self, "torque_limit")
+        _require_positive(self, "control_period", "rate_gain", "attitude_gain", "filter_bandwidth")
+        _require_positive(self, "adaptation_coupling", "adaptation_gain", "torque_limit")
         if self.forgetting < 0.0:
             raise ValueError(f"forgetting is {self.forgetting:g} 1/s: zero or more would do")
         if self.filter_bandwidth * self.control_period >= 1.0:
@@ -223,23 +212,21 @@ class Adaptive:
         The filtered rate starts at the rate: from zero it would err for good (erratum 25).
         """
         lead = measurement.rate.shape[:-1]
-        return AdaptiveState(
-            attitude=_nearer(measurement, reference),
-            theta_hat=np.zeros((*lead, 9)),
-            g=np.zeros((*lead, 9)),
-            Z=np.zeros((*lead, 9, 9)),
-            w_f=measurement.rate.copy(),
-            P_f=np.zeros((*lead, 3, 3)),
-            t_f=np.zeros((*lead, 3)),
-        )
+        theta_hat, g, Z = np.zeros((*lead, 9)), np.zeros((*lead, 9)), np.zeros((*lead, 9, 9))
+        w_f, P_f, t_f = measurement.rate.copy(), np.zeros((*lead, 3, 3)), np.zeros((*lead, 3))
+        return AdaptiveState(_nearer(measurement, reference), theta_hat, g, Z, w_f, P_f, t_f)
 
     def step(
         self, state: AdaptiveState, time: float, measurement: Measurement, reference: Reference
-    ) -> tuple[AdaptiveState, Command, AdaptiveSignals]:
+    ) -> tuple[AdaptiveState, TorqueCommand, AdaptiveSignals]:
         """Return the next state, the torque, the errors and the estimates."""
         seen, rate, _ = measurement
         torque, e, wd, eps, *after = kernels.adaptive(seen, rate, *reference, *state, self._gains)
-        return AdaptiveState(*after), Command(torque), AdaptiveSignals(e, wd, state.theta_hat, eps)
+        return (
+            AdaptiveState(*after),
+            TorqueCommand(torque),
+            AdaptiveSignals(e, wd, state.theta_hat, eps),
+        )
 
     @cached_property
     def _gains(self) -> Array:

@@ -15,14 +15,7 @@ import numpy as np
 from numba import guvectorize, njit
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Measurement, Reference, gain
-
-
-class Command(NamedTuple):
-    """What the law asks for."""
-
-    torque: Array
-    """On the bus [N m], body axes, (..., 3)."""
+from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
 
 
 class State(NamedTuple):
@@ -82,12 +75,12 @@ class ImmersionInvariance:
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
-    ) -> tuple[State, Command, Signals]:
+    ) -> tuple[State, TorqueCommand, Signals]:
         """Return the next state, the torque and the errors."""
         torque, x_e, z, *angles = _law(*measurement, *reference, *state, *self._vehicle)
         after = State(*angles)
         singularity = 0.5 * pi - np.abs(after.angles[..., 1:2])
-        return after, Command(torque), Signals(x_e, z, singularity)
+        return after, TorqueCommand(torque), Signals(x_e, z, singularity)
 
     @cached_property
     def _vehicle(self) -> tuple[Array, Array, Array, Array]:

@@ -48,11 +48,6 @@ class ReactionWheels:
         )
         return given
 
-    def torque_on_bus(self, ctrl: Array) -> Array:
-        """Return the motors' reaction on the bus [N m], body axes, shape (..., 3)."""
-        torque: Array = _reaction(ctrl, self.axes)
-        return torque
-
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
 @numba.guvectorize(
@@ -75,11 +70,3 @@ def _motor_torque(
             given = 0.0
         ctrl[i] = given
         saturated[i] = 1.0 if given != wanted else 0.0
-
-
-@numba.guvectorize(["void(f8[:], f8[:, :], f8[:])"], "(n),(n,k)->(k)", cache=True)
-def _reaction(ctrl: Any, axes: Any, torque: Any) -> None:
-    for k in range(torque.size):
-        torque[k] = 0.0
-        for i in range(ctrl.size):
-            torque[k] -= axes[i, k] * ctrl[i]

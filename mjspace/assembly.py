@@ -13,8 +13,9 @@ from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.errors import blamed_on
 from mjspace.one_by_one import OneByOne
 from mjspace.plant import Vehicle
-from mjspace.scenario import Component, Scenario, Wheels
+from mjspace.scenario import Component, Scenario
 from mjspace.sensors import SensorSuite
+from mjspace.tables import Wheels
 
 
 @dataclass(frozen=True)

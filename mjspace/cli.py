@@ -5,18 +5,13 @@ early), 2 bad input. Modules are imported when a command needs them: ``--help`` 
 """
 
 import json
-import sys
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from mjspace.flight import Result
-    from mjspace.log_reader import Log
+from mjspace.terminal import finish, open_log, print_warning, progress_bar, told_in_one_line
 
 app = typer.Typer(
     help="Fly control laws on multibody spacecraft in MuJoCo.",
@@ -41,8 +36,8 @@ Video = Annotated[bool, typer.Option("--video", help="Also render the log: fligh
 
 def main() -> None:
     """Run the command line; the entry point."""
-    warnings.showwarning = _warn
-    with _errors():
+    warnings.showwarning = print_warning
+    with told_in_one_line():
         app()
 
 
@@ -70,7 +65,7 @@ def info(
     if target.endswith(".mcap"):
         from mjspace import report
 
-        log = _open(Path(target))
+        log = open_log(Path(target))
         if as_json:
             print(json.dumps(report.log_data(log), indent=2))
         else:
@@ -102,10 +97,10 @@ def run(
     extra += [f"duration={duration!r}"] if duration else []
     loaded, folder = load(scenario, [*overrides, *extra])
     assembly = assemble(loaded, folder)
-    with _progress(loaded.duration, "s", "flying") as progress:
+    with progress_bar(loaded.duration, "s", "flying") as progress:
         path = output_folder(out, loaded.name) / "flight.mcap"
         result = fly_to_log(assembly, path, progress=progress)
-    _finish(result, plot_it, video, as_json)
+    finish(result, plot_it, video, as_json)
 
 
 @app.command()
@@ -138,8 +133,8 @@ def replay(
         raise InputError("--gain: goes with --law")
     if verify and law:
         raise InputError("--verify: another law flies another flight: leave --law out")
-    logged = _open(log)
-    with _progress(logged.end, "s", "flying") as progress:
+    logged = open_log(log)
+    with progress_bar(logged.end, "s", "flying") as progress:
         if verify:
             difference = again.verify(log, start=start, progress=progress)
         else:
@@ -151,7 +146,7 @@ def replay(
                 progress=progress,
             )
     if not verify:
-        _finish(result, plot_it, video, as_json)
+        finish(result, plot_it, video, as_json)
     elif as_json:
         print(json.dumps({"identical": difference is None, "difference": str(difference or "")}))
     else:
@@ -176,7 +171,7 @@ def render(
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit()):
         raise InputError(f"--size {size}: write width and height in pixels, as in 960x540")
-    with _progress(_open(log).end, "s", "rendering") as progress, blamed_on("render"):
+    with progress_bar(open_log(log).end, "s", "rendering") as progress, blamed_on("render"):
         to_picture(
             log,
             output,
@@ -199,83 +194,7 @@ def plot(
     from mjspace.errors import blamed_on
     from mjspace.plot import plot as to_picture
 
+    open_log(log)
     with blamed_on("plot"):
         to_picture(log, output)
     print(output)
-
-
-def _finish(result: "Result", plot_it: bool, video: bool, as_json: bool) -> None:
-    """Print the verdict, make the pictures that were asked for, and exit with the status."""
-    from mjspace import report
-
-    pictures = {}
-    if not as_json:
-        report.print_result(result)
-        print(f"log    {result.path}")
-    if plot_it:
-        from mjspace.plot import plot as to_plot
-
-        pictures["plot"] = result.path.with_suffix(".png")
-        to_plot(result.path, pictures["plot"])
-    if video:
-        from mjspace.render import render as to_video
-
-        pictures["video"] = result.path.with_suffix(".mp4")
-        with _progress(result.log.end, "s", "rendering") as progress:
-            to_video(result.path, pictures["video"], progress=progress)
-    if as_json:
-        shown = {name: str(path) for name, path in pictures.items()}
-        print(json.dumps(report.result_data(result) | shown, indent=2))
-    else:
-        for name, path in pictures.items():
-            print(f"{name:6} {path}")
-    if result.signal:
-        raise typer.Exit(128 + result.signal)
-    raise typer.Exit(0 if result.passed else 1)
-
-
-def _open(path: Path) -> "Log":
-    from mjspace.errors import blamed_on
-    from mjspace.log_reader import Log
-
-    with blamed_on("log"):
-        return Log(path)
-
-
-@contextmanager
-def _progress(total: float, unit: str, doing: str) -> Iterator[Callable[[float], None]]:
-    """Give a function to tell how far it is; a bar is drawn on a terminal after two seconds."""
-    from tqdm import tqdm
-
-    layout = "{desc} {percentage:3.0f}% |{bar}| {n:.1f}/{total:.1f} {unit} [{elapsed}<{remaining}]"
-    with tqdm(
-        total=total, desc=doing, unit=unit, delay=2, disable=None, leave=False, bar_format=layout
-    ) as bar:
-        yield lambda reached: bar.update(reached - bar.n) and None
-
-
-@contextmanager
-def _errors() -> Iterator[None]:
-    """Turn what a user can mend into one line and an exit status; anything else is a bug."""
-    try:
-        yield
-    except Exception as error:
-        status = _status(error)
-        if status is None:
-            raise
-        print(f"mjspace: {error}", file=sys.stderr)
-        sys.exit(status)
-
-
-def _status(error: Exception) -> int | None:
-    from mjspace.errors import FlightError, InputError, NoRendererError
-
-    if isinstance(error, InputError):
-        return 2
-    if isinstance(error, FlightError | NoRendererError | OSError):
-        return 1
-    return None
-
-
-def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"mjspace: warning: {message}", file=sys.stderr)

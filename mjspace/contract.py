@@ -34,14 +34,21 @@ class Reference(NamedTuple):
     """Time derivative of the components of ``rate`` [rad/s^2], shape (..., 3)."""
 
 
+class TorqueCommand(NamedTuple):
+    """What a law asks of the reaction wheels."""
+
+    torque: Array
+    """On the bus, body axes [N m], shape (..., 3)."""
+
+
 class Law(Protocol):
     """A control law: gains in, two pure functions, no hidden state.
 
     ``state``, ``command`` and ``signals`` are named tuples of float64 arrays whose leading axes are
     those of the measurement; they are logged under their field names, so their shapes never change
     during a flight. A law that says ``batched = True`` handles any leading axes; another sees the
-    arrays of one vehicle and is flown one by one. A command for reaction wheels has a field ``torque``: the torque on the bus
-    [N m], body axes, shape (..., 3).
+    arrays of one vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any
+    command with that field.
     """
 
     def reset(self, measurement: Measurement, reference: Reference) -> Any:

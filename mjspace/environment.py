@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from mjspace import environment_kernel as kernel
 from mjspace import kepler, struct_offsets
 from mjspace.contract import Array
-from mjspace.scenario import DisturbanceTorque, Environment, Orbit
+from mjspace.tables import DisturbanceTorque, Environment, Orbit
 
 SENSOR = "environment"
 """Name of the user sensor (6 numbers, needstage "vel") that is given the environment's total on the

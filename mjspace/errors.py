@@ -18,12 +18,12 @@ class NoRendererError(RuntimeError):
 
 @contextmanager
 def blamed_on(key: str) -> Iterator[None]:
-    """Turn a ValueError from building a part into an InputError that names ``key``, once."""
+    """Turn what a part or a file of the user's raises into an InputError that names ``key``."""
     try:
         yield
     except InputError:
         raise
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         message = str(error)
         named = message.startswith(key)
         raise InputError(message if named else f"{key}: {message}") from error

@@ -8,7 +8,7 @@ from numba import njit
 
 from mjspace.constants import GM, RADIUS
 from mjspace.contract import Array
-from mjspace.scenario import Orbit
+from mjspace.tables import Orbit
 
 
 def pack(orbit: Orbit) -> Array:

@@ -7,7 +7,7 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from mjspace.contract import Array
-from mjspace.scenario import PlantTable, Wheels
+from mjspace.tables import PlantTable, Wheels
 
 
 class Inertial(NamedTuple):

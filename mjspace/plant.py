@@ -17,7 +17,7 @@ import numpy as np
 
 from mjspace import guards, mass
 from mjspace.contract import Array
-from mjspace.scenario import Initial, PlantTable, Rates
+from mjspace.tables import Initial, PlantTable, Rates
 
 _ASSETS = Path(str(files("mjspace.assets")))
 _WHEEL_GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
@@ -40,8 +40,6 @@ class Vehicle:
     """Unit spin axes, body axes, shape (n, 3)."""
     wheel_inertia: Array
     """Axial inertia of each rotor [kg m^2], shape (n,)."""
-    wheel_qpos: Any
-    """Index of each wheel's angle in ``qpos``, shape (n,)."""
     wheel_dof: Any
     """Index of each wheel's speed in ``qvel``, shape (n,)."""
     torque_limit: float
@@ -235,7 +233,6 @@ def _exit(half_size: Array, axis: Array) -> float:
 def _addresses(model: Any, wheels: int) -> dict[str, Any]:
     joints = [model.joint(f"wheel_{index}") for index in range(wheels)]
     return {
-        "wheel_qpos": _frozen(np.array([joint.qposadr[0] for joint in joints])),
         "wheel_dof": _frozen(np.array([joint.dofadr[0] for joint in joints])),
         **{name: _sensor(model, name) for name in ("momentum", "kinetic", "environment")},
     }

@@ -82,6 +82,22 @@ def any_to_si(value: str) -> float:
     return magnitude * UNITS[written][1] if written else magnitude
 
 
+def whole_number(span: float, unit: float, span_key: str, unit_key: str) -> int:
+    """Return how many ``unit`` [s] make up ``span`` [s].
+
+    Raises:
+        ValueError: not a whole number of them, with both keys and the nearest that would do.
+    """
+    count = round(span / unit)
+    if count < 1 or abs(span / unit - count) > 1e-6:
+        near = max(count, 1) * unit
+        raise ValueError(
+            f"{span_key} {span:g} s is no whole number of {unit_key} {unit:g} s: "
+            f"{near:g} s would be"
+        )
+    return count
+
+
 def _split(value: str) -> tuple[float, str]:
     number, _, written = value.strip().partition(" ")
     try:

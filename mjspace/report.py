@@ -21,7 +21,9 @@ def print_result(result: Result) -> None:
         table.add_column("verdict")
         for verdict in result.verdicts:
             word = "[green]PASS[/]" if verdict.passed else "[bold red]FAIL[/]"
-            table.add_row(escape(verdict.check.name), f"{verdict.measured:.4g}", verdict.bound, word)
+            table.add_row(
+                escape(verdict.check.name), f"{verdict.measured:.4g}", verdict.bound, word
+            )
         console.print(table)
     if result.trouble:
         console.print(f"[bold red]ended early:[/] {escape(result.trouble)}", highlight=False)

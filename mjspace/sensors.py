@@ -10,7 +10,8 @@ import numpy as np
 
 from mjspace.contract import Array, Measurement
 from mjspace.noise import normals
-from mjspace.scenario import Rates, RateSensor, Sensors, StarTracker, whole_number
+from mjspace.quantity import whole_number
+from mjspace.tables import Rates, RateSensor, Sensors, StarTracker
 
 State = dict[str, Array]
 """What the sensors remember, vehicle axis first. Each one that is not ideal has

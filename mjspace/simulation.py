@@ -10,11 +10,13 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from mjspace import attitude, environment
+from mjspace import environment
 from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Reference
 from mjspace.errors import FlightError
-from mjspace.scenario import Scenario, whole_number
+from mjspace.held_disturbance import HeldDisturbance
+from mjspace.quantity import whole_number
+from mjspace.scenario import Scenario
 from mjspace.tape import Block, Columns, Tape
 
 BLOCK_PERIODS = 500
@@ -113,7 +115,7 @@ class _Flight:
         self.ctrl, self.sensordata = self.batch.bind("ctrl"), self.batch.bind("sensordata")
         self.push = None
         if assembly.disturbance is not None:
-            self.push = _Push(
+            self.push = HeldDisturbance(
                 assembly.disturbance, self.batch, assembly.vehicle.model.body("bus").id
             )
         self.steps = whole_number(
@@ -202,30 +204,6 @@ class _Flight:
             count = 1 if self.push is not None else self.tick - step % self.tick
             self.batch.step(nstep=count)
             step += count
-
-
-class _Push:
-    """The user's own disturbance, held over one integration step as a force on the bus."""
-
-    def __init__(self, disturbance: Callable[..., tuple[Any, Any]], batch: Batch, bus: int) -> None:
-        self._disturbance = disturbance
-        self._applied = batch.bind("xfrc_applied")[:, bus]
-
-    def __call__(self, now: float, truth: Measurement) -> Array:
-        """Apply it and return force [N], inertial axes, and torque [N m], body axes, (N, 6)."""
-        rows = []
-        for one in map(Measurement, *truth):
-            try:
-                force, torque = self._disturbance(now, one)
-                rows.append(np.concatenate([np.asarray(force, float), np.asarray(torque, float)]))
-            except Exception as error:
-                raise FlightError(
-                    f"the disturbance raised {type(error).__name__}: {error}"
-                ) from error
-        wrench = np.array(rows)
-        self._applied[:, :3] = wrench[:, :3]
-        self._applied[:, 3:] = attitude.rotate(truth.attitude, wrench[:, 3:])
-        return wrench
 
 
 def _until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:

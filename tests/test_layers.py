@@ -22,12 +22,23 @@ A_LAW_MAY_IMPORT = (
 # These packages are known to no other module of the testbed.
 ONLY_IN = {
     "mujoco": (
-        *("plant", "environment", "struct_offsets", "guards", "simulation", "tape", "recorder"),
-        *("geometry", "offscreen", "render", "stage", "replay", "environments"),
+        *(
+            "plant",
+            "environment",
+            "struct_offsets",
+            "guards",
+            "simulation",
+            "held_disturbance",
+            "tape",
+            "recorder",
+        ),
+        *("geometry", "offscreen", "render", "stage", "replay", "environments", "dm_bridge"),
     ),
     "mcap": ("log_*",),
-    "dm_control": ("environments",),
+    "dm_control": ("dm_bridge",),
     "dm_env": ("environments",),
+    "mjspace.dm_bridge": ("environments",),
+    "mjspace.environments": (),  # imported only when asked for
     "mjspace.controllers": (),  # a scenario names its law, and the loader imports it
 }
 

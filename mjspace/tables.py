@@ -1,0 +1,233 @@
+"""The tables of a scenario: rates, plant, initial state, environment and sensors."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from mjspace.fields import (
+    Angle,
+    Angles3,
+    Finite,
+    Matrix3,
+    Meters3,
+    Momentum3,
+    NonNegative,
+    Positive,
+    Quaternion,
+    Rate3,
+    Seconds,
+    Si,
+    Table,
+    Time,
+    Torque3,
+    Unit3,
+    Velocity3,
+)
+
+
+class Rates(Table):
+    """How often things happen."""
+
+    physics: Seconds = 1e-3
+    """Integration step."""
+    control: Seconds = 1e-3
+    """Control period, a whole number of integration steps: law, actuators and log."""
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = "RK4"
+    """MuJoCo's integrator; all but RK4 are first order, and are warned of."""
+
+
+class Wheels(Table):
+    """Reaction wheels: one for each axis; every wheel is alike."""
+
+    axes: Annotated[list[Unit3], Field(min_length=1)] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    """Spin axes in body axes, one row for each wheel; normalized."""
+    positions: list[Meters3] | None = None
+    """Rotor centres in the body [m]; the centre of mass when left out."""
+    inertia: Annotated[Positive, Si("kg m^2")] = 0.05
+    """Axial rotor inertia."""
+    transverse_inertia: Annotated[Positive, Si("kg m^2")] | None = None
+    """Transverse rotor inertia; half the axial when left out."""
+    mass: Annotated[Positive, Si("kg")] = 2.0
+    """Rotor mass."""
+    torque_limit: Annotated[Positive, Si("N m")] | None = None
+    """Largest motor torque; none when left out."""
+    speed_limit: Annotated[Positive, Si("rad/s")] | None = None
+    """Largest speed relative to the bus; at it the motor gives no torque that would raise it."""
+    viscous_friction: Annotated[NonNegative, Si("N m s/rad")] = 0.0
+    """Bearing torque for each rad/s."""
+    coulomb_friction: Annotated[NonNegative, Si("N m")] = 0.0
+    """Bearing torque at any speed, smoothed through zero: c tanh(speed / 0.1 rad/s)."""
+    static_imbalance: Annotated[NonNegative, Si("kg m")] = 0.0
+    """Rotor mass times its centre's offset from the spin axis."""
+    dynamic_imbalance: Annotated[NonNegative, Si("kg m^2")] = 0.0
+    """Product of inertia between the spin axis and a transverse one."""
+
+    @model_validator(mode="after")
+    def _alike(self) -> "Wheels":
+        if any(np.linalg.norm(axis) < 1e-9 for axis in self.axes):
+            raise ValueError("axes: a spin axis has no direction")
+        if self.positions is not None and len(self.positions) != len(self.axes):
+            raise ValueError(
+                f"positions: {len(self.positions)} rows for {len(self.axes)} axes: give as many"
+            )
+        return self
+
+
+class PlantTable(Table):
+    """The vehicle: an assembly from assets/, with its mass properties and wheels."""
+
+    model: str = "satellite_3rw"
+    """Name of a folder in assets/."""
+    mass: Annotated[Positive, Si("kg")] = 100.0
+    """Mass of the bus alone."""
+    bus_inertia: Matrix3 | None = None
+    """Inertia of the bus alone about its centre of mass, body axes; any symmetric positive-definite
+    matrix. The asset's own when neither this nor ``gyrostat_inertia`` is given."""
+    gyrostat_inertia: Matrix3 | None = None
+    """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia; the
+    bus inertia follows from it."""
+    wheels: Wheels = Wheels()
+
+    @model_validator(mode="after")
+    def _one_inertia(self) -> "PlantTable":
+        if self.bus_inertia is not None and self.gyrostat_inertia is not None:
+            raise ValueError("bus_inertia and gyrostat_inertia are both given: give one")
+        for name in ("bus_inertia", "gyrostat_inertia"):
+            rows = getattr(self, name)
+            if rows is None:
+                continue
+            matrix = np.array(rows)
+            if not np.allclose(matrix, matrix.T, rtol=1e-12, atol=0.0):
+                raise ValueError(f"{name}: not symmetric")
+            if np.linalg.eigvalsh(matrix)[0] <= 0.0:
+                raise ValueError(f"{name}: not positive definite")
+        return self
+
+
+class Initial(Table):
+    """The state at time zero."""
+
+    attitude: Quaternion | None = None
+    """Quaternion, scalar first, body to inertial; normalized. Identity when left out."""
+    euler: Angles3 | None = None
+    """Or roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll), body to inertial."""
+    rate: Rate3 = [0.0, 0.0, 0.0]
+    """Angular velocity, body axes."""
+    position: Meters3 = [0.0, 0.0, 0.0]
+    """Of the bus, inertial axes; in the free-fall frame when there is an orbit."""
+    velocity: Velocity3 = [0.0, 0.0, 0.0]
+    """Of the bus, inertial axes."""
+    wheel_speed: Annotated[list[Finite], Si("rad/s")] | None = None
+    """Wheel speeds relative to the bus; zero when left out."""
+    momentum: Momentum3 | None = None
+    """Or the wanted total angular momentum about the centre of mass, inertial axes: the wheel
+    speeds follow (the smallest, where more than three wheels can make it)."""
+
+    @model_validator(mode="after")
+    def _one_of_each(self) -> "Initial":
+        if self.attitude is not None and self.euler is not None:
+            raise ValueError("attitude and euler are both given: give one")
+        if self.wheel_speed is not None and self.momentum is not None:
+            raise ValueError("wheel_speed and momentum are both given: give one")
+        if self.attitude is not None and np.linalg.norm(self.attitude) < 1e-6:
+            raise ValueError("attitude: a zero quaternion is no attitude")
+        return self
+
+
+class Orbit(Table):
+    """A Kepler orbit: its gravity gradient acts on every body, in the free-fall frame."""
+
+    body: Literal["earth", "moon"] = "earth"
+    """What is orbited."""
+    semi_major_axis: Annotated[Positive, Si("m")]
+    """From the body's centre."""
+    eccentricity: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    """0 is a circle."""
+    inclination: Angle = 0.0
+    """To the inertial x-y plane."""
+    ascending_node: Angle = 0.0
+    """Right ascension of the ascending node."""
+    periapsis: Angle = 0.0
+    """Argument of periapsis."""
+    true_anomaly: Angle = 0.0
+    """At time zero."""
+
+
+class Sine(Table):
+    """One sinusoid of a disturbance torque, on each axis: amplitude sin(frequency t + phase)."""
+
+    amplitude: Torque3
+    """On each axis."""
+    frequency: Annotated[Positive, Si("rad/s")]
+    """The same on every axis."""
+    phase: Angles3 = [0.0, 0.0, 0.0]
+    """On each axis."""
+
+
+class DisturbanceTorque(Table):
+    """A torque on the bus from outside: a bias and a sum of sinusoids of time."""
+
+    frame: Literal["body", "inertial"] = "body"
+    """The axes in which the components are constant or periodic."""
+    bias: Torque3 = [0.0, 0.0, 0.0]
+    """Constant part."""
+    sines: list[Sine] = []
+    """Periodic part."""
+
+
+class Environment(Table):
+    """What acts on the vehicle from outside; nothing when left out."""
+
+    orbit: Orbit | None = None
+    torques: list[DisturbanceTorque] = []
+    """Evaluated at every stage of the integrator."""
+    python: str | None = None
+    """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
+    inertial axes, torque [N m] in body axes), held over each integration step: first order only."""
+
+
+class SensorTiming(Table):
+    """When a sensor samples and when it reports."""
+
+    period: Seconds | None = None
+    """Time between samples, a whole number of integration steps; else the control period."""
+    delay: Time = 0.0
+    """Age of a sample when it is reported, a whole number of sample periods."""
+
+
+class StarTracker(SensorTiming):
+    """Attitude sensor; its errors are small rotations about the body axes. Ideal by default."""
+
+    noise: Annotated[NonNegative, Si("rad")] = 0.0
+    """Standard deviation of the white noise of each sample, on each axis."""
+    bias: Annotated[NonNegative, Si("rad")] = 0.0
+    """Standard deviation of the constant bias drawn at the start, on each axis."""
+    bias_walk: Annotated[NonNegative, Si("rad")] = 0.0
+    """Standard deviation that the bias's random walk has after one second."""
+    quantization: Annotated[NonNegative, Si("rad")] = 0.0
+    """Size of the least significant digit."""
+
+
+class RateSensor(SensorTiming):
+    """Gyro or tachometer. Ideal by default."""
+
+    noise: Annotated[NonNegative, Si("rad/s")] = 0.0
+    """Standard deviation of the white noise of each sample, on each axis."""
+    bias: Annotated[NonNegative, Si("rad/s")] = 0.0
+    """Standard deviation of the constant bias drawn at the start, on each axis."""
+    bias_walk: Annotated[NonNegative, Si("rad/s")] = 0.0
+    """Standard deviation that the bias's random walk has after one second."""
+    quantization: Annotated[NonNegative, Si("rad/s")] = 0.0
+    """Size of the least significant digit."""
+
+
+class Sensors(Table):
+    """The vehicle's sensors."""
+
+    attitude: StarTracker = StarTracker()
+    """Star tracker."""
+    rate: RateSensor = RateSensor()
+    """Gyro."""
+    wheel_speed: RateSensor = RateSensor()
+    """Wheel tachometers."""
