@@ -12,7 +12,6 @@ import pytest
 from mjspace.controllers.contraction import (
     Adaptive,
     AdaptiveState,
-    Command,
     Gradient,
     Ideal,
     IdealState,
@@ -238,7 +237,7 @@ class Printed(Ideal):
         after, command, signals = super().step(state, time, measurement, reference)
         right = att.rotate(att.conjugate(measurement.attitude), HI)
         change = np.cross(right - self.momentum(measurement.attitude), signals.wd)
-        return after, Command(command.torque + change), signals
+        return after, command._replace(torque=command.torque + change), signals
 
 
 class PrintedRotation(Printed):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mjspace.controllers.immersion_invariance import Command, ImmersionInvariance, State
+from mjspace.controllers.immersion_invariance import ImmersionInvariance, State
 from mjspace.controllers.references import EulerSinusoids
 from oracle import Flight, fly, total_momentum, wheel_speeds
 
@@ -143,7 +143,8 @@ class PrintedMomentum(ImmersionInvariance):
         after, command, signals = super().step(state, time, measurement, reference)
         q = measurement.attitude
         excess = att.rotate(att.conjugate(q), P_R) - att.rotate(q, P_R)
-        return after, Command(command.torque + np.cross(excess, measurement.rate)), signals
+        torque = command.torque + np.cross(excess, measurement.rate)
+        return after, command._replace(torque=torque), signals
 
 
 def test_printed_momentum_leaves_an_error() -> None:

@@ -71,9 +71,10 @@ def test_a_step_is_a_pure_function(law: Any) -> None:
     twice = law.step(state, PERIOD, later, next_)
     assert all(same(a, b) for a, b in zip(once, twice, strict=True))
     assert same(state, before)
-    assert all(new is not old for part in once for new in part for old in (*later, *next_)), (
-        "the law hands back an array that is not its own"
-    )
+    # A sensor may write its next sample where the last one was.
+    returned = (*law.reset(seen, reference), *(array for part in once for array in part))
+    for given in (*seen, *reference, *later, *next_):
+        assert not any(np.shares_memory(array, given) for array in returned)
 
 
 @laws
