@@ -17,7 +17,7 @@ SOUND = """
   <worldbody>
     <body name="bus">
       {free}
-      <inertial pos="0 0 0" mass="100" diaginertia="15 12 18"/>
+      <inertial pos="0 0 0" mass="100" diaginertia="0.6 0.5 0.7"/>
       <geom name="hull" type="box" size="1 1 1"/>
       <body name="rotor">
         <joint name="spin" axis="0 0 1" {joint}/>
@@ -41,7 +41,7 @@ DEFAULTS = {
     "tilt": "0",
     "actuator": '<motor name="motor" joint="spin"/>',
 }
-SHARE = 1.0 / (1.0 / 0.05 + 1.0 / 18.05)  # kg m^2: what the motor turns, rotor against bus
+SHARE = 1.0 / (1.0 / 0.05 + 1.0 / 0.7)  # kg m^2: what the motor turns, rotor against bus
 
 
 def model(**defect: str) -> Any:
