@@ -28,9 +28,8 @@ MAGIC = b"\x89MCAP0\r\n"
 NAME = "mjspace"
 """Of the metadata record, without which a file is no log of ours."""
 
-_IN_FLIGHT = (
-    2  # chunks that wait for the disk; beyond them the flight waits, so that memory is flat
-)
+# Chunks that may wait for the disk; beyond them the flight waits, so that memory is flat.
+_IN_FLIGHT = 2
 
 
 class LogFile:

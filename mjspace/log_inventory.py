@@ -121,18 +121,18 @@ def read_messages(file: BinaryIO, place: ChunkPlace, channel: int) -> list[bytes
 
 
 def _walk(file: BinaryIO) -> Iterator[tuple[int, int]]:
-    """Yield the opcode of each whole record of the data section, and where its content is."""
+    """Yield the opcode of each whole record, and where its content is."""
+    # The summary too: other writers put schemas and channels into chunks, and again only there.
     size = file.seek(0, io.SEEK_END)
-    position, opcode = len(MAGIC), None
-    while opcode != Opcode.DATA_END:
+    position = len(MAGIC)
+    while True:
         file.seek(position)
         head = file.read(_RECORD.size)
         if len(head) < _RECORD.size:
             return
         opcode, length = _RECORD.unpack(head)
         position += _RECORD.size
-        # A power cut may leave zeros behind; no record has opcode 0.
-        if not opcode or position + length > size:
+        if position + length > size:
             return
         yield opcode, position
         position += length

@@ -11,11 +11,25 @@ from typing import Any
 
 import numpy as np
 import pytest
-from log_samples import ATTACHMENTS, BLOCKS, METADATA, SCENE, TOPICS, UNITS, fly, rows
+from log_samples import (
+    ATTACHMENTS,
+    BLOCKS,
+    METADATA,
+    SCENE,
+    TOPICS,
+    UNITS,
+    create,
+    fly,
+    rows,
+    write_block,
+)
 from mcap.opcode import Opcode
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.stream_reader import StreamReader
+from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
+
+from mjspace.log_reader import Log
 
 RERUN = Path(sys.executable).with_name("rerun")
 
@@ -120,6 +134,16 @@ def test_the_summary_agrees_with_the_data(flown: Path) -> None:
     assert channels["/truth"].metadata["unit.attitude_error"] == UNITS["/truth"]["attitude_error"]
 
 
+def test_the_summary_says_when_a_flight_from_the_middle_began(tmp_path: Path) -> None:
+    with create(tmp_path / "flight.mcap") as log:
+        write_block(log, 5000, 10)
+    with (tmp_path / "flight.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_start_time == 5_000_000_000
+
+
 def test_the_summarys_checksum_covers_it_and_the_footer(flown: Path) -> None:
     # The specification: from the summary's first byte to the last before the checksum itself, which
     # the closing magic follows.
@@ -169,6 +193,41 @@ def test_the_examples_on_the_page_run(
     assert f"{sum(BLOCKS)} 0.0 0.167 True" in capsys.readouterr().out
     exec(plain, {})
     assert len(capsys.readouterr().out.splitlines()) == sum(BLOCKS)
+
+
+def test_a_copy_by_another_writer_reads_the_same(flown: Path, tmp_path: Path) -> None:
+    # Its chunks end elsewhere, hold schemas and channels, and the channels' numbers are others.
+    path = tmp_path / "copy.mcap"
+    with flown.open("rb") as file, path.open("wb") as copy:
+        writer = Writer(copy, chunk_size=5000)
+        writer.start()
+        writer.add_metadata("mjspace", METADATA)
+        numbers: dict[str, int] = {}
+        for schema, channel, message in make_reader(file).iter_messages(reverse=False):
+            assert schema is not None
+            if channel.topic not in numbers:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                numbers[channel.topic] = writer.register_channel(
+                    channel.topic, channel.message_encoding, number, channel.metadata
+                )
+            writer.add_message(
+                numbers[channel.topic],
+                message.log_time,
+                message.data,
+                message.publish_time,
+                message.sequence,
+            )
+        writer.finish()
+    ours, theirs = Log(flown), Log(path)
+    assert theirs.complete
+    assert theirs.topics == ours.topics
+    assert theirs.events() == ours.events()
+    assert len(theirs) == len(ours)
+    for topic in ours.topics:
+        wanted = ours.read(topic)
+        assert {name: column.tobytes() for name, column in theirs.read(topic).items()} == {
+            name: column.tobytes() for name, column in wanted.items()
+        }
 
 
 @pytest.mark.skipif(not RERUN.exists(), reason="rerun-sdk is not installed")
