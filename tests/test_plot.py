@@ -48,6 +48,12 @@ def test_the_page_has_every_panel(page: Figure, log: Log) -> None:
     assert all(title.removeprefix("Law: ") in log.topics["/law"] for title in signals)
 
 
+def test_what_is_zero_throughout_is_left_out(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+    force = Panel("Force", "/disturbance", "force")  # the bus stands where tides are zero
+    monkeypatch.setattr("mjspace.panels.STANDARD", (force, RATE))
+    assert titles(figure(log))[0] == "Body rate [deg/s]"
+
+
 def test_angles_are_in_degrees_and_rates_have_their_reference(page: Figure, log: Log) -> None:
     error = np.degrees(log.read("/truth", ["attitude_error"])["attitude_error"]).max()
     assert np.max(page.axes[0].lines[0].get_ydata()) == pytest.approx(error, rel=1e-12)
