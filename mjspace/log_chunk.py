@@ -2,7 +2,7 @@
 
 ``mcap``'s own writer takes messages one by one: 5.6 us each, so 39 us for the seven of a control
 period. Here a chunk's content comes as NumPy records, and the indexes follow from their strides:
-1.4 us for the seven, of the thread that flies (a satellite's 280 numbers, blocks of 500 periods).
+1.6 us for the seven, of the thread that flies (a satellite's 280 numbers, blocks of 500 periods).
 """
 
 import zlib
