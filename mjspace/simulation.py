@@ -20,7 +20,7 @@ from mjspace.scenario import Scenario
 from mjspace.tape import Block, Columns, Tape
 
 BLOCK_PERIODS = 500
-BLOCK_SECONDS = 0.4  # of wall time: with the writing of it, less than the second a kill may cost
+BLOCK_SECONDS = 0.25  # of wall time: a kill may cost three blocks, and should not cost a second
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
 

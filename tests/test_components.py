@@ -55,7 +55,7 @@ def test_facts_fill_what_the_table_leaves_out_and_the_table_wins() -> None:
     np.testing.assert_array_equal(law.inertia, FACTS["inertia"])
     assert law.rate_gain == 30.0
     assert flown.gains["rate_gain"] == 30.0
-    assert flown.gains["inertia"] == FACTS["inertia"].tolist()
+    assert flown.gains["inertia"] == np.asarray(FACTS["inertia"]).tolist()
     law, _ = build("contraction:Ideal", inertia=np.eye(3).tolist())
     np.testing.assert_array_equal(law.inertia, np.eye(3))
 

@@ -170,7 +170,7 @@ def test_pitch_libration_frequency() -> None:
         mujoco.mj_step(model, data)
     # zero crossings of the cubic through both ends' angles and rates
     crossings = []
-    for k in np.flatnonzero(np.diff(np.sign(angles))):
+    for k in np.flatnonzero(np.diff(np.sign(angles))).tolist():
         a, b, u, v = angles[k], angles[k + 1], step * rates[k], step * rates[k + 1]
         cubic = np.roots([2 * (a - b) + u + v, 3 * (b - a) - 2 * u - v, u, a])
         inside = cubic[(abs(cubic.imag) < 1e-9) & (abs(cubic.real - 0.5) <= 0.5)]
@@ -315,7 +315,7 @@ def test_frames_and_several_torques_add_up() -> None:
     model, data = compiled(BODY, Environment(torques=[body, inertial, body]), step=0.01)
     data.qpos[3:7], data.time = TUMBLING, 1.23
     mujoco.mj_forward(model, data)
-    wanted = 2.0 * torque_at(1.23) + axes(TUMBLING).T @ [0.5, 0.1, -0.2]
+    wanted = np.asarray(2.0 * torque_at(1.23)) + axes(TUMBLING).T @ np.array([0.5, 0.1, -0.2])
     np.testing.assert_allclose(data.qfrc_passive[3:], wanted, atol=1e-15)  # 1 ulp of 1
     np.testing.assert_array_equal(data.qfrc_passive[:3], 0.0)
 

@@ -231,9 +231,9 @@ def test_a_flight_goes_on_from_any_logged_state(start: int) -> None:
     again, seen_again = fly(suite(**tables), moving, range(start, 600), logged)
     for one, other in zip(seen[start:], seen_again, strict=True):
         assert_same_bits(one, other)
-    for one, other in zip(states[start:], again, strict=True):
-        assert one.keys() == other.keys()
-        assert_same_bits(one.values(), other.values())
+    for before, after in zip(states[start:], again, strict=True):
+        assert before.keys() == after.keys()
+        assert_same_bits(before.values(), after.values())
 
 
 def test_state_is_float64_of_constant_shape_and_never_changed() -> None:

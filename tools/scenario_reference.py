@@ -1,0 +1,138 @@
+"""Write docs/scenario.md from the typed scenario, so that the page cannot say anything else."""
+
+from collections.abc import Iterator
+from dataclasses import MISSING, Field, fields, is_dataclass
+from importlib import import_module
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from annotated_types import MaxLen
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from mjspace.fields import Si
+from mjspace.scenario import Scenario
+
+PAGE = Path(__file__).parents[1] / "docs/scenario.md"
+HEAD = """# The scenario reference
+
+A scenario is a TOML file. This page is written by `python tools/scenario_reference.py` from the
+typed model that reads it. Unknown keys, wrong units and wrong shapes are refused with the file, the
+key and what would be right. Numbers are SI; where a unit is given, a string does too:
+`"30 deg/s"`, `"5 mN m"`, `"2 min"`. `mjspace info NAME` shows a scenario with every default written
+out, and `--set key=value` overrides any key.
+"""
+
+
+def page() -> str:
+    """Return the page."""
+    lines = [HEAD]
+    for path, table in _tables(Scenario, ""):
+        lines += [f"## {f'`{path}`' if path else 'At the top'}", "", _line(table.__doc__ or ""), ""]
+        lines += ["| key | value | default | what |", "|---|---|---|---|"]
+        for key, field in table.model_fields.items():
+            inner = _table_in(field.annotation)
+            what = _line(field.description or (inner.__doc__ if inner else "") or "")
+            lines.append(f"| `{key}` | {_value(field)} | {_default(field)} | {what} |")
+        lines.append("")
+    return "\n".join(lines + _laws())
+
+
+def _laws() -> list[str]:
+    """Return what may stand behind ``kind``, with its gains."""
+    lines = ["## Laws and references that come with mjspace", ""]
+    lines += ["| kind | gains (unit): default |", "|---|---|"]
+    package = import_module("mjspace.controllers")
+    for path in sorted(Path(package.__path__[0]).glob("[a-z]*.py")):
+        module = import_module(f"mjspace.controllers.{path.stem}")
+        for name, kind in vars(module).items():
+            if is_dataclass(kind) and kind.__module__ == module.__name__:
+                gains = ", ".join(_gain(f) for f in fields(kind) if "unit" in f.metadata)
+                lines.append(f"| `{path.stem}:{name}` | {gains} |")
+    closing = """
+A gain without a default must be given, but for `inertia`, `wheel_axes`, `wheel_inertia` and
+`control_period`: left out, they are those of the vehicle and the scenario as flown. Arrays may come
+from a CSV file: `file = "turn.csv"`, with a header that names the gains
+(`time,attitude0,attitude1,attitude2,attitude3`)."""
+    return [*lines, closing, ""]
+
+
+def _gain(field: Field[Any]) -> str:
+    unit = f" ({field.metadata['unit']})" if field.metadata["unit"] else ""
+    if field.default_factory is not MISSING:
+        return f"`{field.name}`{unit}: {field.default_factory().tolist()}"
+    return f"`{field.name}`{unit}" + ("" if field.default is MISSING else f": {field.default}")
+
+
+def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
+    """Yield each table of a scenario with its TOML heading, in the order of the keys."""
+    yield path, table
+    for key, field in table.model_fields.items():
+        inner = _table_in(field.annotation)
+        if inner is not None:
+            name = f"{path.strip('[]')}.{key}".lstrip(".")
+            many = get_origin(field.annotation) is list
+            yield from _tables(inner, f"[[{name}]]" if many else f"[{name}]")
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((t for part in get_args(annotation) if (t := _table_in(part))), None)
+
+
+def _value(field: FieldInfo) -> str:
+    """Return what a key holds, as a person says it."""
+    annotation = field.annotation
+    if _table_in(annotation):
+        return "tables" if get_origin(annotation) is list else "table"
+    return _kind(Annotated[annotation, *field.metadata] if field.metadata else annotation)
+
+
+def _kind(annotation: Any) -> str:
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return " or ".join(f'`"{choice}"`' for choice in parts)
+    if origin is UnionType or origin is Union:
+        return " or ".join(_kind(part) for part in parts if part is not NoneType)
+    sizes, unit, scalar = _shape(annotation)
+    word = {float: "number", int: "whole number", str: "text", bool: "true or false"}[scalar]
+    count = f"{' x '.join(sizes)} {word}s" if sizes else word
+    return f"{count} [{unit}]" if unit else count
+
+
+def _shape(annotation: Any) -> tuple[list[str], str, type]:
+    """Return the sizes ('n' where free) of nested lists, the unit, and the type inside."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        sizes, unit, scalar = _shape(parts[0])
+        for mark in parts[1:]:
+            if isinstance(mark, Si) and mark.unit:
+                unit = mark.unit
+            limits = mark.metadata if isinstance(mark, FieldInfo) else [mark]
+            for limit in limits:
+                if isinstance(limit, MaxLen):
+                    sizes = [str(limit.max_length), *sizes[1:]]
+        return sizes, unit, scalar
+    if origin is list:
+        sizes, unit, scalar = _shape(parts[0])
+        return ["n", *sizes], unit, scalar
+    return [], "", annotation
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "**required**"
+    default = field.get_default(call_default_factory=True)
+    if default is None or default == "" or isinstance(default, BaseModel):
+        return ""
+    return f"`{str(default).lower() if isinstance(default, bool) else default}`"
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split()).replace("``", "`").replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page())
