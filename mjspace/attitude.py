@@ -113,11 +113,16 @@ def from_euler_zyx(angles: Array) -> Array:
 
 
 def to_euler_zyx(q: Array) -> Array:
-    """Return roll, pitch, yaw [rad] (..., 3): roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2]."""
+    """Return roll, pitch, yaw [rad] (..., 3): roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2].
+
+    Yaw is taken after roll has been undone, so that at a pitch of 90 deg, where the matrix leaves
+    roll to rounding, the two still make up the rotation together.
+    """
     r = to_matrix(q)
     roll = np.arctan2(r[..., 2, 1], r[..., 2, 2])
+    s, c = np.sin(roll), np.cos(roll)
     pitch = np.arctan2(-r[..., 2, 0], np.hypot(r[..., 2, 1], r[..., 2, 2]))
-    yaw = np.arctan2(r[..., 1, 0], r[..., 0, 0])
+    yaw = np.arctan2(s * r[..., 0, 2] - c * r[..., 0, 1], c * r[..., 1, 1] - s * r[..., 1, 2])
     return np.stack([roll, pitch, yaw], axis=-1)
 
 

@@ -160,7 +160,7 @@ def render(
     output: Annotated[Path, typer.Option("-o", "--output", help="x.mp4, or x.png for a still.")],
     camera: Annotated[str, typer.Option(help="A camera of the model.")] = "chase",
     size: Annotated[str, typer.Option(metavar="WxH", help="In pixels.")] = "960x540",
-    rate: Annotated[float, typer.Option(help="Frames a second.")] = 30.0,
+    rate: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds for each second.")] = 1.0,
     at: Annotated[float | None, typer.Option(help="Time of a still [s]; else the end.")] = None,
 ) -> None:
@@ -189,6 +189,10 @@ def render(
 def plot(
     log: LogFile,
     output: Annotated[Path, typer.Option("-o", "--output", help="A PNG file.")],
+    signals: Annotated[
+        list[str],
+        typer.Option("--signal", help="Plot this signal, as truth.rate[0]; repeatable."),
+    ] = [],  # noqa: B006
 ) -> None:
     """Plot a log: errors, rates, torques, wheel speeds, the law's signals, disturbances."""
     from mjspace.errors import blamed_on
@@ -196,5 +200,5 @@ def plot(
 
     open_log(log)
     with blamed_on("plot"):
-        to_picture(log, output)
+        to_picture(log, output, signals=signals)
     print(output)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from mjspace.attitude import rotate, to_matrix
+from mjspace.attitude import rotate, to_euler_zyx
 from mjspace.contract import Array
 from mjspace.log_schema import Scene
 
@@ -117,7 +117,10 @@ def _urdf(shapes: dict[str, list[_Shape]]) -> str:
         for i, shape in enumerate(shape for shape in drawn if shape.kind != "mesh"):
             visual = ElementTree.SubElement(link, "visual")
             ElementTree.SubElement(
-                visual, "origin", xyz=_numbers(shape.position), rpy=_numbers(_rpy(shape.quaternion))
+                visual,
+                "origin",
+                xyz=_numbers(shape.position),
+                rpy=_numbers(to_euler_zyx(shape.quaternion)),
             )
             _add_solid(ElementTree.SubElement(visual, "geometry"), shape)
             material = ElementTree.SubElement(visual, "material", name=f"{body}_{i}")
@@ -137,20 +140,6 @@ def _add_solid(geometry: ElementTree.Element, shape: _Shape) -> None:
         ElementTree.SubElement(geometry, "cylinder", radius=repr(x / 2), length=repr(z))
     else:
         ElementTree.SubElement(geometry, "sphere", radius=repr((x * y * z) ** (1 / 3) / 2))
-
-
-def _rpy(q: Array) -> Array:
-    """Return URDF's roll, pitch, yaw [rad]: R = Rz(yaw) Ry(pitch) Rx(roll).
-
-    Yaw is taken after roll has been undone, so that at a pitch of 90 deg, where the matrix leaves
-    roll to rounding, the two still make up the rotation together.
-    """
-    r = to_matrix(q)
-    roll = np.arctan2(r[2, 1], r[2, 2])
-    s, c = np.sin(roll), np.cos(roll)
-    pitch = np.arctan2(-r[2, 0], np.hypot(r[2, 1], r[2, 2]))
-    yaw = np.arctan2(s * r[0, 2] - c * r[0, 1], c * r[1, 1] - s * r[1, 2])
-    return np.array([roll, pitch, yaw])
 
 
 def _numbers(values: Array) -> str:

@@ -143,3 +143,12 @@ def test_import_is_light() -> None:
         "sys.exit(bool(heavy) and str(heavy))"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
+def test_euler_angles_make_up_the_rotation_at_a_pitch_of_90_degrees(pitch: float) -> None:
+    for roll, yaw in [(0.0, 0.0), (0.3, -1.2), (2.0, 3.0)]:
+        q = attitude.from_euler_zyx(np.array([roll, pitch, yaw]))
+        again = attitude.from_euler_zyx(attitude.to_euler_zyx(q))
+        # The pitch itself is the arctangent of rounding: half the digits are left.
+        assert attitude.rotation_angle(q, again) < 1e-7
