@@ -1,10 +1,17 @@
 """Its presence puts this folder on the path: ``from oracle import fly`` works in every test."""
 
+import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from mjspace.flight import run
+
+# The same examples on every run where a failure could not be told from a change.
+settings.register_profile("ci", derandomize=True)
+if os.environ.get("CI"):
+    settings.load_profile("ci")
 
 
 @pytest.fixture(scope="session")

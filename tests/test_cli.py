@@ -112,6 +112,7 @@ def test_bad_input_gets_one_line_and_2_and_nothing_is_written(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["mjspace", *arguments])
     with warnings.catch_warnings(), pytest.raises(SystemExit) as ended:
+        warnings.simplefilter("default")  # told, as on a command line, not raised
         main()
     assert ended.value.code == 2
     told = capsys.readouterr().err.splitlines()
