@@ -111,9 +111,10 @@ def test_bad_input_gets_one_line_and_2_and_nothing_is_written(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["mjspace", *arguments])
-    with warnings.catch_warnings(), pytest.raises(SystemExit) as ended:
+    with warnings.catch_warnings():
         warnings.simplefilter("default")  # told, as on a command line, not raised
-        main()
+        with pytest.raises(SystemExit) as ended:
+            main()
     assert ended.value.code == 2
     told = capsys.readouterr().err.splitlines()
     lines = [line for line in told if not line.startswith("mjspace: warning")]
