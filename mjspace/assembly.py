@@ -70,11 +70,9 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
     }
     flown: dict[str, Any] = {}
     sources = {}
-    law, flown["law"], sources["law"] = _part(
-        "law", _component, scenario.law, facts, law_folder or folder
-    )
-    reference, flown["reference"], sources["reference"] = _part(
-        "reference", _component, scenario.reference, facts, folder
+    law, flown["law"], sources["law"] = _component("law", scenario.law, facts, law_folder or folder)
+    reference, flown["reference"], sources["reference"] = _component(
+        "reference", scenario.reference, facts, folder
     )
     disturbance = None
     kind = scenario.environment.python
@@ -84,10 +82,6 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         flown["environment"] = scenario.environment.model_copy(
             update={"python": _in_log("disturbance", kind)}
         )
-    flown["law"] = flown["law"].model_copy(update={"kind": _in_log("law", scenario.law.kind)})
-    flown["reference"] = flown["reference"].model_copy(
-        update={"kind": _in_log("reference", scenario.reference.kind)}
-    )
     qpos, qvel = _part("initial", plant.initial_state, vehicle, scenario.initial)
     assembly = Assembly(
         scenario=scenario.model_copy(update=flown),
@@ -112,10 +106,13 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
 
 
 def _component(
-    component: Component, facts: dict[str, Any], folder: Path
+    role: str, component: Component, facts: dict[str, Any], folder: Path
 ) -> tuple[Any, Component, str]:
-    kind = load_object(component.kind, folder)
-    built, flown = construct(component, kind, facts, folder)
+    """Return the law or reference, its table as flown, and the text that defines it."""
+    with blamed_on(role):
+        kind = load_object(component.kind, folder)
+        built, flown = construct(component, kind, facts, folder)
+    flown = flown.model_copy(update={"kind": _in_log(role, component.kind)})
     return built, flown, source_of(kind)
 
 

@@ -77,6 +77,8 @@ def fly(
     period = start.period
     while period <= last:
         tape, trouble = flight.record(period, last, stop)
+        if not len(tape):
+            raise FlightError(trouble)
         block, problem = _until_trouble(
             tape.block(assembly, flight.columns, saturated), flight.columns
         )
@@ -156,7 +158,7 @@ class _Flight:
         tape.sensors.append(self.sensors)
         self.sensors, measurement = self.suite.sample(self.sensors, period * self.steps, truth)
         before, command, signals = self._ask_law(now, measurement, reference)
-        motor, saturated = self.assembly.wheels.motor_torque(command.torque, truth.wheel_speed)
+        motor, saturated = self._drive(command, truth)
         self.ctrl[:] = motor
         if self.push is not None:
             tape.push.append(self.push(now, truth))
@@ -189,6 +191,15 @@ class _Flight:
         except Exception as error:
             raise FlightError(f"the law raised {type(error).__name__}: {error}") from error
         return before, command, signals
+
+    def _drive(self, command: Any, truth: Measurement) -> tuple[Array, Array]:
+        """Return the wheels' motor torques, and which of them are cut."""
+        try:
+            return self.assembly.wheels.motor_torque(command.torque, truth.wheel_speed)
+        except Exception as error:
+            raise FlightError(
+                f"the law's command has no torque of shape (..., 3) [N m]: {error}"
+            ) from error
 
     def _rest_of_period(self, first_step: int) -> None:
         """Integrate from the period's first substep to its end, with the samples due in between."""

@@ -9,6 +9,7 @@ import numpy as np
 from mjspace import attitude
 from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Reference
+from mjspace.errors import FlightError
 
 Rows = dict[str, dict[str, Array]]
 
@@ -126,13 +127,22 @@ class Tape:
 
 
 def _fields(tuples: list[Any]) -> dict[str, Array]:
-    """Return the named tuples' fields as arrays with a period axis."""
-    if not tuples or not tuples[0]:
+    """Return the named tuples' fields as arrays with a period axis.
+
+    Raises:
+        FlightError: no named tuples of arrays, or arrays that change their shape.
+    """
+    if not tuples[0]:
         return {}
-    return {
-        name: np.array(values)
-        for name, values in zip(tuples[0]._fields, zip(*tuples, strict=True), strict=True)
-    }
+    try:
+        names = tuples[0]._fields
+        columns = zip(*tuples, strict=True)
+        return {n: np.array(column, float) for n, column in zip(names, columns, strict=True)}
+    except (AttributeError, TypeError, ValueError) as error:
+        raise FlightError(
+            f"a law's state, command and signals are named tuples of arrays of constant shape; "
+            f"{type(tuples[0]).__name__} is not: {error}"
+        ) from error
 
 
 def _saturation_events(

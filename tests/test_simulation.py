@@ -1,5 +1,6 @@
 """The loop on the real plant: against an independent integration, against itself, in trouble."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -146,6 +147,16 @@ class Law:
             torque[1] = np.nan
         if time > 0.0105 and self.trouble == "raise":
             1 / 0
+        if self.trouble == "at once":
+            1 / 0
+        if self.trouble == "no torque":
+            return None, Signals(time), Signals(time)
+        if self.trouble == "two":
+            return None, Command(np.zeros(2)), Signals(time)
+        if self.trouble == "plain":
+            return None, Command(torque), [time]
+        if self.trouble == "shape":
+            return None, Command(torque), Signals(np.zeros(1 + int(time > 0.0055)))
         if time > 0.0105 and self.trouble == "huge":
             torque[0] = 1e300
         return None, Command(torque), Signals(time)
@@ -183,6 +194,23 @@ def test_trouble_ends_the_flight_and_keeps_every_good_period(
     for fields in kept[0].rows.values():
         for values in fields.values():
             assert np.isfinite(values).all()
+
+
+@pytest.mark.parametrize(
+    ("trouble", "message"),
+    [
+        ("at once", "t = 0 s: the law raised ZeroDivisionError"),
+        ("no torque", "t = 0 s: the law's command has no torque"),
+        ("two", "t = 0 s: the law's command has no torque of shape"),
+        ("plain", "named tuples of arrays of constant shape; list is not"),
+        ("shape", "named tuples of arrays of constant shape; Signals is not"),
+    ],
+)
+def test_a_law_that_cannot_be_flown_is_told_so(law: Path, trouble: str, message: str) -> None:
+    changes = ["duration=0.01", "law={kind='law.py:Law'}", f"law.trouble={trouble!r}"]
+    built = assembly("contraction-ideal", *changes, folder=law)
+    with pytest.raises(FlightError, match=re.escape(message)):
+        flown(built)
 
 
 def test_stop_is_obeyed_at_once() -> None:
