@@ -63,12 +63,13 @@ def replay(
     """
     with blamed_on("log"):
         log = Log(log_path)
+    path = Path(out) / "flight.mcap"
+    if path.exists() and path.samefile(log_path):
+        raise InputError(f"--out {out}: holds the very log that is to be flown again")
     with assembly_of(log, law, folder) as assembly:
         begin = start_of(log, assembly, start, fresh_law=law is not None)
         member = int(log.metadata["member"])
-        return fly_to_log(
-            assembly, Path(out) / "flight.mcap", member=member, start=begin, progress=progress
-        )
+        return fly_to_log(assembly, path, member=member, start=begin, progress=progress)
 
 
 def verify(
