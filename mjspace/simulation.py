@@ -127,16 +127,16 @@ class _Flight:
 
     def record(self, first: int, last: int, stop: Callable[[], bool]) -> tuple[Tape, str]:
         """Fly a block of periods and return the tape, and why it cannot go on ('' where it can)."""
-        tape = Tape(first)
         control = self.assembly.scenario.rates.control
         end = min(first + BLOCK_PERIODS - 1, last)
-        references = self.assembly.reference.at(np.arange(first, end + 1, dtype=float) * control)
+        wanted = self.assembly.reference.at(np.arange(first, end + 1, dtype=float) * control)
+        tape = Tape(first, wanted)
         due = clock.monotonic() + BLOCK_SECONDS
         now = first * control
         try:
             # A law's infinities are found in what it commands, not in NumPy's warnings.
             with np.errstate(all="ignore"):
-                for period, reference in enumerate(map(Reference, *references), first):
+                for period, reference in enumerate(map(Reference, *wanted), first):
                     now = period * control
                     self._fly_period(tape, period, now, reference, flown=period < last)
                     if stop() or clock.monotonic() > due:
@@ -169,7 +169,6 @@ class _Flight:
             self.batch.forward()
         tape.law.append(before)
         tape.measurement.append(measurement)
-        tape.reference.append(reference)
         tape.command.append(command)
         tape.wheel_torque.append(motor)
         tape.saturated.append(saturated)

@@ -62,14 +62,15 @@ class Columns:
 
 @dataclass
 class Tape:
-    """One list entry for each control period since the last block; arrays have a vehicle axis."""
+    """One list entry for each control period of a block; arrays have a vehicle axis."""
 
     period: int
+    reference: Reference
+    """Arrays of at least as many rows as will be recorded, without a vehicle axis."""
     physics: list[Array] = field(default_factory=list)
     sensors: list[dict[str, Array]] = field(default_factory=list)
     law: list[Any] = field(default_factory=list)
     measurement: list[Measurement] = field(default_factory=list)
-    reference: list[Reference] = field(default_factory=list)
     command: list[Any] = field(default_factory=list)
     wheel_torque: list[Array] = field(default_factory=list)
     saturated: list[Array] = field(default_factory=list)
@@ -86,7 +87,7 @@ class Tape:
         n, vehicle = len(self), assembly.vehicle
         physics = np.array(self.physics[:n])
         data = np.array(self.sensordata)
-        reference = {name: a[:, None] for name, a in _fields(self.reference[:n]).items()}
+        reference = {name: a[:n, None] for name, a in self.reference._asdict().items()}
         truth = columns.truth(physics)
         state = {"physics": physics}
         state |= {f"law_{name}": a for name, a in _fields(self.law[:n]).items()}
