@@ -2,7 +2,6 @@
 
 import dataclasses
 import tempfile
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from mjspace.assembly import Assembly, assemble
 from mjspace.contract import Measurement, Reference
 from mjspace.errors import InputError, blamed_on
 from mjspace.flight import Progress, Result, fly_to_log
-from mjspace.loading import validate
+from mjspace.flown import scenario_of
 from mjspace.log_reader import Log
 from mjspace.scenario import Component
 from mjspace.simulation import Start, fly
@@ -108,8 +107,8 @@ def assembly_of(
     Raises:
         InputError: the log lacks one of them, or the law cannot be built.
     """
-    table = tomllib.loads(log.attachment("scenario.toml").decode())
-    scenario = validate(table, "the log's scenario")
+    with blamed_on("log"):
+        scenario = scenario_of(log)
     if law is not None:
         # What the logged law signals, another need not.
         kept = [check for check in scenario.checks if not check.signal.startswith("law.")]
