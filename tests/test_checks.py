@@ -54,6 +54,14 @@ def test_statistics_of_a_scalar(statistic: str, value: float) -> None:
     assert measure(signal="truth.error", statistic=statistic) == pytest.approx(value, rel=1e-15)
 
 
+def test_drift_is_from_the_start_of_the_window_not_of_a_chunk() -> None:
+    ramp = np.arange(6.0)
+    check = Check(name="x", signal="truth.error", statistic="drift", below=1.0)
+    assert judge(Tape(ramp, RATE), [check])[0].measured == 5.0
+    late = check.model_copy(update={"start": 0.2})
+    assert judge(Tape(ramp, RATE), [late])[0].measured == 3.0
+
+
 def test_a_vector_is_judged_by_its_norm_and_a_component_by_itself() -> None:
     assert measure(signal="truth.rate") == 25.0
     assert measure(signal="truth.rate[2]") == 12.0

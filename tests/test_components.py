@@ -36,6 +36,7 @@ class Damper:
     gain: float = 2.0
 
     def reset(self, measurement, reference):
+        assert measurement.attitude.shape == (4,)
         assert measurement.rate.shape == (3,)
         return None
 
