@@ -20,6 +20,7 @@ from mjspace.scenario import Scenario
 from mjspace.tape import Block, Columns, Tape
 
 BLOCK_PERIODS = 500
+BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
 BLOCK_SECONDS = 0.25  # of wall time: a kill may cost three blocks, and should not cost a second
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -124,11 +125,13 @@ class _Flight:
             scenario.rates.control, scenario.rates.physics, "rates.control", "rates.physics"
         )
         self.tick = math.gcd(self.steps, *self.suite.ticks)
+        recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
+        self.periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
 
     def record(self, first: int, last: int, stop: Callable[[], bool]) -> tuple[Tape, str]:
         """Fly a block of periods and return the tape, and why it cannot go on ('' where it can)."""
         control = self.assembly.scenario.rates.control
-        end = min(first + BLOCK_PERIODS - 1, last)
+        end = min(first + self.periods - 1, last)
         wanted = self.assembly.reference.at(np.arange(first, end + 1, dtype=float) * control)
         tape = Tape(first, wanted)
         due = clock.monotonic() + BLOCK_SECONDS
