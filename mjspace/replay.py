@@ -87,12 +87,14 @@ def verify(
         for block in fly(assembly, begin, [int(log.metadata["member"])]):
             rows = one_vehicle(block)["/state"]
             logged = log.read("/state", start=block.time[0], end=block.time[-1])
+            if not len(logged["time"]):
+                break  # the log ended with the block before: its flight was interrupted
             found = _first_difference(logged, rows)
             if found is not None:
                 return found
             progress(float(block.time[-1]))
             if len(logged["time"]) < len(block.time):
-                break  # the log ends here: its flight was interrupted
+                break
     return None
 
 

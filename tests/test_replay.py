@@ -9,6 +9,7 @@ import pytest
 from mjspace.assembly import assemble
 from mjspace.errors import InputError
 from mjspace.flight import Result, run
+from mjspace.flown import scenario_of
 from mjspace.loading import component
 from mjspace.log_reader import Log
 from mjspace.plant import UnphysicalInertiaWarning
@@ -134,6 +135,19 @@ def test_what_cannot_be_replayed_is_refused(noisy: Result, tmp_path: Path) -> No
         replay(noisy.path, noisy.path.parent)
     with pytest.raises(InputError, match=r"law: .*Damper"):
         replay(noisy.path, tmp_path, law=component("contraction:Damper", []))
+
+
+def test_a_log_that_ends_with_a_block_is_verified_to_its_end(
+    noisy: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if it had been interrupted there: the flight goes on to a block that the log lacks."""
+    from mjspace import replay as module
+
+    longer = scenario_of(noisy.log).model_copy(update={"duration": 0.8})
+    monkeypatch.setattr(module, "scenario_of", lambda _: longer)
+    for periods in (401, 200, 7):
+        monkeypatch.setattr("mjspace.simulation.BLOCK_PERIODS", periods)
+        assert verify(noisy.path) is None
 
 
 def test_a_cut_log_is_verified_as_far_as_it_goes(noisy: Result, tmp_path: Path) -> None:
