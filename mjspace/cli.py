@@ -98,7 +98,7 @@ def run(
     extra += [f"duration={duration!r}"] if duration else []
     loaded, folder = load(scenario, [*overrides, *extra])
     assembly = assemble(loaded, folder)
-    with progress_bar(loaded.duration, "s", "flying") as progress:
+    with progress_bar(loaded.duration, "flying") as progress:
         path = output_folder(out, loaded.name) / "flight.mcap"
         result = fly_to_log(assembly, path, progress=progress)
     finish(result, plot_it, video, as_json)
@@ -135,7 +135,7 @@ def replay(
     if verify and law:
         raise InputError("--verify: another law flies another flight: leave --law out")
     logged = open_log(log)
-    with progress_bar(logged.end, "s", "flying") as progress:
+    with progress_bar(logged.end, "flying") as progress:
         if verify:
             difference = again.verify(log, start=start, progress=progress)
         else:
@@ -172,7 +172,7 @@ def render(
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit()):
         raise InputError(f"--size {size}: write width and height in pixels, as in 960x540")
-    with progress_bar(open_log(log).end, "s", "rendering") as progress, blamed_on("render"):
+    with progress_bar(open_log(log).end, "rendering") as progress, blamed_on("render"):
         to_picture(
             log,
             output,

@@ -18,8 +18,7 @@ from dm_env.specs import BoundedArray
 from mjspace import attitude, dm_bridge, environment, loading
 from mjspace.assembly import Assembly, assemble
 from mjspace.contract import Array, Measurement, Reference
-from mjspace.quantity import whole_number
-from mjspace.scenario import Scenario
+from mjspace.held_disturbance import HeldDisturbance
 from mjspace.simulation import BLOCK_PERIODS, INTEGRATION, first_start, last_period
 from mjspace.tape import Columns
 
@@ -42,7 +41,7 @@ def load(scenario: str | Path, overrides: Iterable[str] = ()) -> Any:
     loaded, folder = loading.load(scenario, overrides)
     assembly = assemble(loaded, folder)
     return dm_bridge.Environment(
-        Physics(assembly), Tracking(assembly), n_sub_steps=_steps_per_period(loaded)
+        Physics(assembly), Tracking(assembly), n_sub_steps=loaded.rates.steps
     )
 
 
@@ -62,7 +61,7 @@ class Physics(dm_bridge.Physics):  # type: ignore[misc]
         self._rates = assembly.scenario.rates
         self._start = first_start(assembly, [0]).physics[0]
         self._suite = assembly.sensors([0])
-        self._period = _steps_per_period(assembly.scenario)
+        self._period = assembly.scenario.rates.steps
         self._tick = math.gcd(self._period, *self._suite.ticks)
         super().__init__(dm_bridge.MjData(dm_bridge.MjModel(assembly.vehicle.model)))
         with self.reset_context():
@@ -128,11 +127,8 @@ class Physics(dm_bridge.Physics):  # type: ignore[misc]
         """Apply the user's own disturbance, held over one integration step."""
         period, step = divmod(self._steps, self._period)
         now = self._steps * self._rates.physics if step else period * self._rates.control
-        truth = self.truth()
-        force, torque = disturbance(now, truth)
         applied = self.data.xfrc_applied[self.model.name2id("bus", "body")]
-        applied[:3] = force
-        applied[3:] = attitude.rotate(truth.attitude, np.asarray(torque, dtype=float))
+        HeldDisturbance(disturbance, applied[None])(now, self._truth())
 
 
 class Tracking(dm_bridge.Task):  # type: ignore[misc]
@@ -215,8 +211,3 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
     def _reference(self, physics: Physics) -> Reference:
         number, row = divmod(physics.period(), BLOCK_PERIODS)
         return Reference(*(values[row] for values in self._block(number)))
-
-
-def _steps_per_period(scenario: Scenario) -> int:
-    rates = scenario.rates
-    return whole_number(rates.control, rates.physics, "rates.control", "rates.physics")

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from mujoco.batch import Batch
 
 from mjspace import attitude
 from mjspace.contract import Array, Measurement
@@ -14,9 +13,10 @@ from mjspace.errors import FlightError
 class HeldDisturbance:
     """A force and torque on the bus, constant over an integration step: first order only."""
 
-    def __init__(self, disturbance: Callable[..., tuple[Any, Any]], batch: Batch, bus: int) -> None:
+    def __init__(self, disturbance: Callable[..., tuple[Any, Any]], applied: Array) -> None:
+        """Write to ``applied``, (N, 6): MuJoCo's force and torque on the bus, inertial axes."""
         self._disturbance = disturbance
-        self._applied = batch.bind("xfrc_applied")[:, bus]
+        self._applied = applied
 
     def __call__(self, now: float, truth: Measurement) -> Array:
         """Apply it and return force [N], inertial axes, and torque [N m], body axes, (N, 6)."""

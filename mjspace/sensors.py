@@ -130,7 +130,7 @@ def _sensor(
     period_key = "rates.control" if table.period is None else f"sensors.{name}.period"
     seconds = rates.control if table.period is None else table.period
     period = whole_number(seconds, rates.physics, period_key, "rates.physics")
-    control = whole_number(rates.control, rates.physics, "rates.control", "rates.physics")
+    control = rates.steps
     errors = (table.noise, table.bias, table.bias_walk, table.quantization, table.delay)
     if not any(errors) and control % period == 0:
         return None

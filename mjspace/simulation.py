@@ -15,7 +15,6 @@ from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Reference
 from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
-from mjspace.quantity import whole_number
 from mjspace.scenario import Scenario
 from mjspace.tape import Block, Columns, Tape
 
@@ -118,12 +117,10 @@ class _Flight:
         self.ctrl, self.sensordata = self.batch.bind("ctrl"), self.batch.bind("sensordata")
         self.push = None
         if assembly.disturbance is not None:
-            self.push = HeldDisturbance(
-                assembly.disturbance, self.batch, assembly.vehicle.model.body("bus").id
-            )
-        self.steps = whole_number(
-            scenario.rates.control, scenario.rates.physics, "rates.control", "rates.physics"
-        )
+            bus = assembly.vehicle.model.body("bus").id
+            applied = self.batch.bind("xfrc_applied")[:, bus]
+            self.push = HeldDisturbance(assembly.disturbance, applied)
+        self.steps = scenario.rates.steps
         self.tick = math.gcd(self.steps, *self.suite.ticks)
         recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
         self.periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))

@@ -24,6 +24,7 @@ from mjspace.fields import (
     Unit3,
     Velocity3,
 )
+from mjspace.quantity import whole_number
 
 
 class Rates(Table):
@@ -35,6 +36,11 @@ class Rates(Table):
     """Control period, a whole number of integration steps: law, actuators and log."""
     integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = "RK4"
     """MuJoCo's integrator; all but RK4 are first order, and are warned of."""
+
+    @property
+    def steps(self) -> int:
+        """How many integration steps make up a control period; ValueError for no whole number."""
+        return whole_number(self.control, self.physics, "rates.control", "rates.physics")
 
 
 class Wheels(Table):

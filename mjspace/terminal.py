@@ -31,7 +31,7 @@ def finish(result: "Result", plot_it: bool, video: bool, as_json: bool) -> None:
         from mjspace.render import render as to_video
 
         pictures["video"] = result.path.with_suffix(".mp4")
-        with progress_bar(result.log.end, "s", "rendering") as progress:
+        with progress_bar(result.log.end, "rendering") as progress:
             to_video(result.path, pictures["video"], progress=progress)
     if as_json:
         shown = {name: str(path) for name, path in pictures.items()}
@@ -54,13 +54,13 @@ def open_log(path: Path) -> "Log":
 
 
 @contextmanager
-def progress_bar(total: float, unit: str, doing: str) -> Iterator[Callable[[float], None]]:
+def progress_bar(total: float, doing: str) -> Iterator[Callable[[float], None]]:
     """Give a function to tell how far it is; a bar is drawn on a terminal after two seconds."""
     from tqdm import tqdm
 
-    layout = "{desc} {percentage:3.0f}% |{bar}| {n:.1f}/{total:.1f} {unit} [{elapsed}<{remaining}]"
+    layout = "{desc} {percentage:3.0f}% |{bar}| {n:.1f}/{total:.1f} s [{elapsed}<{remaining}]"
     with tqdm(
-        total=total, desc=doing, unit=unit, delay=2, disable=None, leave=False, bar_format=layout
+        total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout
     ) as bar:
         yield lambda reached: bar.update(reached - bar.n) and None
 
