@@ -32,6 +32,7 @@ ONLY_IN = {
             "tape",
             "recorder",
         ),
+        *("stand", "meter", "passport", "basilisk"),
         *("geometry", "offscreen", "render", "stage", "replay", "environments", "dm_bridge"),
     ),
     "mcap": ("log_*",),

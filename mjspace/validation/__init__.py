@@ -1,0 +1,1 @@
+"""Measures this MuJoCo, this version, on this machine, against what is known."""
