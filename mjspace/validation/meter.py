@@ -29,10 +29,15 @@ def kinetic_energy(record: Record) -> Array:
     return np.array([_sums(record.model, data)[2] for data in _states(record)])
 
 
-def drift(values: Array, scale: float) -> float:
-    """Return the largest departure from the first row, over ``scale`` in the rows' unit."""
-    departure = (values - values[0]).reshape(len(values), -1)
-    return float(np.linalg.norm(departure, axis=1).max() / scale)
+def drift(values: Array, scale: float | None = None) -> float:
+    """Return the largest departure of the rows from the first, over ``scale`` in their unit.
+
+    ``scale`` is the first row's size when left out; give the bus's part where a fast wheel has most
+    of it.
+    """
+    rows = values.reshape(len(values), -1)
+    size = np.linalg.norm(rows[0]) if scale is None else scale
+    return float(np.linalg.norm(rows - rows[0], axis=1).max() / size)
 
 
 def _states(record: Record) -> Iterator[Any]:

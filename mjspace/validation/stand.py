@@ -7,6 +7,7 @@ of state and time alone. Everything here is for one process: that callback is gl
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +91,7 @@ def fly(
     install = _installer(load)
     install()
     try:
-        for first, last in zip(marks[:-1], marks[1:], strict=True):
+        for first, last in pairwise(marks):
             if before_step is None and conditions.fault != "held":
                 mujoco.mj_step(model, data, last - first)
             else:
