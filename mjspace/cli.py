@@ -1,4 +1,4 @@
-"""The command line: ``mjspace list | info | run | replay | render | plot``.
+"""The command line: ``mjspace list | info | run | replay | render | plot | validate``.
 
 Exit status: 0 all is well, 1 flown but a check failed (or a replay differed, or the flight ended
 early), 2 bad input. Modules are imported when a command needs them: ``--help`` answers at once.
@@ -11,7 +11,9 @@ from typing import Annotated
 
 import typer
 
+from mjspace.options import Json, LogFile, Out, Plot, Set, Video
 from mjspace.terminal import finish, open_log, print_warning, progress_bar, told_in_one_line
+from mjspace.validation.command import validate
 
 app = typer.Typer(
     help="Fly control laws on multibody spacecraft in MuJoCo.",
@@ -20,19 +22,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help, in half the time
 )
-
-Set = Annotated[
-    list[str],
-    typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario; repeatable."),
-]
-Json = Annotated[bool, typer.Option("--json", help="Answer in JSON, for another program.")]
-LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="The MCAP log of a flight.")]
-Out = Annotated[
-    Path | None,
-    typer.Option("--out", help="Folder to write; runs/<scenario>/<UTC stamp> when left out."),
-]
-Plot = Annotated[bool, typer.Option("--plot", help="Also plot the log: flight.png.")]
-Video = Annotated[bool, typer.Option("--video", help="Also render the log: flight.mp4.")]
 
 
 def main() -> None:
@@ -203,3 +192,6 @@ def plot(
     with blamed_on("plot"):
         to_picture(log, output, signals=signals)
     print(output)
+
+
+app.command()(validate)

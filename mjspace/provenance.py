@@ -26,11 +26,18 @@ def metadata(scenario: Scenario, model: bytes, member: int) -> dict[str, str]:
         "control_period": repr(scenario.rates.control),
         "duration": repr(scenario.duration),
         "model_sha256": hashlib.sha256(model).hexdigest(),
-        "mjspace": __version__,
         "git": _revision(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        **software(),
+    }
+
+
+def software() -> dict[str, str]:
+    """Return the versions of what computes, and where it does."""
+    return {
+        "mjspace": __version__,
         "python": platform.python_version(),
         "platform": f"{sys.platform} {platform.machine()}",
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
         **{package: version(package) for package in PACKAGES},
     }
 

@@ -54,11 +54,13 @@ def open_log(path: Path) -> "Log":
 
 
 @contextmanager
-def progress_bar(total: float, doing: str) -> Iterator[Callable[[float], None]]:
+def progress_bar(
+    total: float, doing: str, count: str = "{n:.1f}/{total:.1f} s "
+) -> Iterator[Callable[[float], None]]:
     """Give a function to tell how far it is; a bar is drawn on a terminal after two seconds."""
     from tqdm import tqdm
 
-    layout = "{desc} {percentage:3.0f}% |{bar}| {n:.1f}/{total:.1f} s [{elapsed}<{remaining}]"
+    layout = "{desc} {percentage:3.0f}% |{bar}| " + count + "[{elapsed}<{remaining}]"
     with tqdm(
         total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout
     ) as bar:

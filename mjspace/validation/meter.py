@@ -29,6 +29,22 @@ def kinetic_energy(record: Record) -> Array:
     return np.array([_sums(record.model, data)[2] for data in _states(record)])
 
 
+def potential_energy(record: Record) -> Array:
+    """Return the energy of springs and of uniform gravity [J], shape (n,)."""
+    energies = []
+    for data in _states(record):
+        mujoco.mj_energyPos(record.model, data)
+        energies.append(data.energy[0])
+    return np.array(energies)
+
+
+def centre_of_mass(record: Record) -> Array:
+    """Return where the moving bodies' centre of mass is [m], world axes, shape (n, 3)."""
+    moving = record.model.body_weldid != 0
+    mass = record.model.body_mass[moving]
+    return np.array([mass @ data.xipos[moving] / mass.sum() for data in _states(record)])
+
+
 def drift(values: Array, scale: float | None = None) -> float:
     """Return the largest departure of the rows from the first, over ``scale`` in their unit.
 
@@ -53,16 +69,16 @@ def _states(record: Record) -> Iterator[Any]:
 
 def _sums(model: Any, data: Any) -> tuple[Array, Array, float]:
     """Return linear momentum, angular momentum about the centre of mass, and kinetic energy."""
-    mass = model.body_mass[1:]
-    place, velocity = data.xipos[1:], np.zeros((model.nbody - 1, 3))
+    moving = np.flatnonzero(model.body_weldid)
+    mass, place, velocity = model.body_mass[moving], data.xipos[moving], np.zeros((moving.size, 3))
     spin, own, energy = np.zeros(6), np.zeros(3), 0.0
-    for body in range(1, model.nbody):
+    for index, body in enumerate(moving):
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body, spin, 0)
         principal = data.ximat[body].reshape(3, 3)
         momentum = principal @ (model.body_inertia[body] * (principal.T @ spin[:3]))
-        velocity[body - 1] = spin[3:]
+        velocity[index] = spin[3:]
         own += momentum
-        energy += 0.5 * (spin[:3] @ momentum + mass[body - 1] * spin[3:] @ spin[3:])
+        energy += 0.5 * (spin[:3] @ momentum + mass[index] * spin[3:] @ spin[3:])
     linear = mass @ velocity
     centre = mass @ place / mass.sum()
     mean = linear / mass.sum()

@@ -1,0 +1,19 @@
+"""Options that several commands have."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Set = Annotated[
+    list[str],
+    typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario; repeatable."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Answer in JSON, for another program.")]
+LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="The MCAP log of a flight.")]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", help="Folder to write; runs/<scenario>/<UTC stamp> when left out."),
+]
+Plot = Annotated[bool, typer.Option("--plot", help="Also plot the log: flight.png.")]
+Video = Annotated[bool, typer.Option("--video", help="Also render the log: flight.mp4.")]

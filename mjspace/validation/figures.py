@@ -1,0 +1,73 @@
+"""A benchmark's figure: what moved, and how each integrator's error grew."""
+
+import io
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from mjspace.plot_style import COLORS, FAINT, STYLE
+from mjspace.validation.benchmark import Integrator
+from mjspace.validation.results import Line, Section
+
+# The first-order ones often coincide: dashes leave all of them to be seen.
+_INTEGRATORS: dict[Integrator, tuple[str, str]] = {
+    "RK4": ("#2f6fd0", "-"),
+    "Euler": ("#d1453b", "-"),
+    "implicit": ("#e08a1e", "--"),
+    "implicitfast": ("#8a4fbf", ":"),
+}
+# The same figure gives the same bytes: no random identifiers, no date.
+_STYLE = STYLE | {"svg.hashsalt": "mjspace", "svg.fonttype": "none", "svg.id": "figure"}
+
+
+def svg(section: Section) -> str:
+    """Return the section's figure as an SVG element."""
+    with matplotlib.rc_context(_STYLE):
+        page = Figure(figsize=(10.0, 3.0), layout="constrained")
+        FigureCanvasSVG(page)
+        motion, error = page.subplots(1, 2, width_ratios=[1.25, 1.0])
+        _draw_motion(motion, section)
+        _draw_errors(error, section)
+        buffer = io.StringIO()
+        page.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def _draw_motion(axes: Any, section: Section) -> None:
+    # A truth and its dots are of one color, whatever the order of the lines.
+    colors: dict[str, str] = {}
+    for line in section.motion:
+        name = line.label.removesuffix(", MuJoCo")
+        color = colors.setdefault(name, COLORS[len(colors) % len(COLORS)])
+        if line.dots:
+            every = max(1, len(line.x) // 40) if line.label != name else 1
+            axes.plot(line.x[::every], line.y[::every], ".", color=color, ms=4.5, label=_key(line))
+        else:
+            axes.plot(line.x, line.y, color=color, label=_key(line))
+    axes.set_xlabel(section.x_label)
+    axes.set_ylabel(section.y_label)
+    axes.legend(fontsize=7, frameon=False, ncols=2, loc="best", handlelength=1.2)
+
+
+def _key(line: Line) -> str | None:
+    """Return the line's legend: dots beside a truth of the same name need none."""
+    return None if line.label.endswith(", MuJoCo") else line.label
+
+
+def _draw_errors(axes: Any, section: Section) -> None:
+    for integrator, line in section.errors.items():
+        y = np.abs(np.array(line.y, dtype=float))
+        y[y == 0.0] = np.nan  # nothing to show on a logarithmic axis
+        color, dashes = _INTEGRATORS[integrator]
+        axes.plot(line.x, y, color=color, linestyle=dashes, label=integrator)
+    axes.set_yscale("log")
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(section.error_label)
+    axes.tick_params(which="minor", length=0)
+    axes.grid(color=FAINT, alpha=0.25)
+    if len(section.errors) > 1:
+        axes.legend(fontsize=7, frameon=False, ncols=2, loc="best", handlelength=1.2)

@@ -1,0 +1,64 @@
+"""The results as pages: one HTML file that needs nothing else, and Markdown with its figures."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+
+from mjspace.validation import figures, wording
+from mjspace.validation.benchmark import FAULTS
+from mjspace.validation.results import Results, Section
+
+JSON, HTML = "validation.json", "validation.html"
+
+
+def write(results: Results, folder: Path) -> tuple[Path, Path]:
+    """Write the JSON and the HTML report into ``folder``, made if need be; return their paths.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    data, page = folder / JSON, folder / HTML
+    data.write_text(results.model_dump_json() + "\n")
+    page.write_text(_rendered("report.html.j2", results, figure=figures.svg))
+    return data, page
+
+
+def write_markdown(results: Results, page: Path) -> None:
+    """Write ``page`` and, in a folder of the same name beside it, its figures.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    drawn = page.with_suffix("")
+    drawn.mkdir(parents=True, exist_ok=True)
+    for section in results.sections:
+        (drawn / f"{section.name}.svg").write_text(figures.svg(section))
+    page.write_text(_rendered("report.md.j2", results, figures=drawn.name))
+
+
+def _rendered(template: str, results: Results, **more: str | Callable[[Section], str]) -> str:
+    environment = Environment(
+        loader=PackageLoader("mjspace.validation"),
+        autoescape=select_autoescape(["html.j2"]),
+        undefined=StrictUndefined,
+    )
+    environment.filters["cell"] = lambda text: text.replace("|", "\\|")
+    words: dict[str, Any] = {
+        "results": results,
+        "faults": FAULTS,
+        "others": wording.OTHERS,
+        "measured": wording.measured,
+        "allowed": wording.allowed,
+        "under": wording.under,
+        "anchor": _anchor,
+    }
+    return environment.get_template(template).render(words | more)
+
+
+def _anchor(section: Section) -> str:
+    """Return the fragment that GitHub gives the section's heading."""
+    kept = (c for c in section.title.lower() if c.isalnum() or c in " -_")
+    return "".join(kept).replace(" ", "-")

@@ -1,0 +1,111 @@
+"""The results as a table on the terminal."""
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from mjspace.validation import wording
+from mjspace.validation.benchmark import FAULTS
+from mjspace.validation.passport import Passport
+from mjspace.validation.results import Results
+
+_PASS, _FAIL = "[green]PASS[/]", "[bold red]FAIL[/]"
+_WIDE = 150  # columns that a table with reasons needs
+
+
+def show(results: Results) -> None:
+    """Print every quantity with its bound and verdict, then which fault was caught by whom.
+
+    A narrow terminal is spared the reasons of the bounds; the report has them.
+    """
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=_WIDE)
+    console.print(_quantities(results, reasons=console.width >= _WIDE))
+    if not results.quick:
+        console.print()
+        console.print(_matrix(results))
+    for section in results.sections:
+        for injected in section.missed:
+            console.print(
+                f"{_FAIL} {section.name} did not notice: {escape(injected.meaning)}",
+                highlight=False,
+            )
+    for remark in results.remarks:
+        console.print(remark, highlight=False, markup=False)
+
+
+def show_passport(passport: Passport) -> None:
+    """Print what the guards say of the model, what was measured of it, and which step it needs."""
+    console = Console()
+    console.print(
+        f"{passport.model}: {passport.integrator}, step {passport.step:g} s",
+        highlight=False,
+        markup=False,
+    )
+    for finding in passport.findings:
+        word = "[bold red]refused[/]" if finding.refused else "[yellow]warning[/]"
+        console.print(f"{word}: {escape(finding.text)}", highlight=False)
+    table = _table("quantity", "measured", "allowed", "verdict", "why that bound")
+    for row in passport.rows:
+        table.add_row(
+            row.quantity,
+            wording.measured(row),
+            wording.allowed(row),
+            _PASS if row.passed else _FAIL,
+            escape(row.reason),
+        )
+    console.print(table)
+    for advice in passport.advice:
+        console.print(advice, highlight=False, markup=False)
+
+
+def _quantities(results: Results, *, reasons: bool) -> Table:
+    others = () if results.quick else wording.OTHERS
+    why = ("why that bound",) if reasons else ()
+    table = _table("benchmark", "quantity", "measured", "allowed", "verdict", *others, *why)
+    for section in results.sections:
+        for row in section.rows:
+            table.add_row(
+                section.name if row is section.rows[0] else "",
+                escape(row.quantity),
+                wording.measured(row),
+                wording.allowed(row),
+                _PASS if row.passed else _FAIL,
+                *(wording.under(row, name) for name in others),
+                *([escape(row.reason)] if reasons else []),
+            )
+    return table
+
+
+def _matrix(results: Results) -> Table:
+    table = _table("caught faults", *FAULTS)
+    for section in results.sections:
+        marks = {injected.fault: injected for injected in section.faults}
+        table.add_row(
+            section.name,
+            *(
+                ""
+                if fault not in marks
+                else "[green]caught[/]"
+                if marks[fault].broken
+                else "[bold red]MISSED[/]"
+                if marks[fault].wanted
+                else "[dim]-[/]"
+                for fault in FAULTS
+            ),
+        )
+    return table
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in columns:
+        if name == "measured" or name in wording.OTHERS:
+            style = "yellow" if name in wording.OTHERS else ""
+            table.add_column(name, justify="right", no_wrap=True, style=style)
+        elif name == "why that bound":
+            table.add_column(name, style="dim", ratio=1)
+        else:
+            table.add_column(name, no_wrap=name == "benchmark")
+    return table
