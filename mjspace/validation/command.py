@@ -20,6 +20,9 @@ def validate(
     model: Annotated[
         Path | None, typer.Option(help="Examine this MJCF or MJB model instead.")
     ] = None,
+    basilisk: Annotated[
+        str, typer.Option(metavar="PYTHON", help="Also compare with the bsk of this interpreter.")
+    ] = "",
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; runs/validate/<UTC stamp> when left out.")
     ] = None,
@@ -27,8 +30,8 @@ def validate(
 ) -> None:
     """Measure MuJoCo's physics against closed forms; or the physics of a model of yours."""
     if model is not None:
-        if only or quick or out:
-            raise InputError("--model: a passport is for one model: leave --only, --quick, --out")
+        if only or quick or basilisk or out:
+            raise InputError("--model: a passport is of one model: leave the other options out")
         from mjspace.validation import passport, table
 
         with blamed_on(f"--model {model}"):
@@ -41,11 +44,13 @@ def validate(
 
     from mjspace.flight import output_folder
     from mjspace.validation import report, suite, table
+    from mjspace.validation.basilisk import compared
 
     with blamed_on("--only"):
         wanted = suite.chosen(only)
     with progress_bar(1.0, "validating", count="") as progress:
         results = suite.validate(wanted, quick=quick, progress=progress)
+    results = compared(results, basilisk)
     data, page = report.write(results, output_folder(out, "validate"))
     if as_json:
         print(data.read_text().rstrip())

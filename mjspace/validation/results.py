@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, computed_field
 
-from mjspace.validation.benchmark import Fault, Integrator
+from mjspace.validation.benchmark import Curve, Fault, Integrator
 
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 """JSON has no NaN: null stands for it."""
@@ -54,6 +54,12 @@ class Line(Data):
     x: list[Number]
     y: list[Number]
     dots: bool = False
+
+    @staticmethod
+    def of(curve: Curve) -> "Line":
+        """Return a curve with six digits, as much as a figure can show."""
+        x, y = ([float(f"{value:.6g}") for value in values] for values in (curve.x, curve.y))
+        return Line(label=curve.label, x=x, y=y, dots=curve.dots)
 
 
 class Section(Data):

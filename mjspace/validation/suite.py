@@ -15,7 +15,6 @@ from mjspace.validation.benchmark import (
     Benchmark,
     Bound,
     Conditions,
-    Curve,
     Fault,
     Readings,
 )
@@ -138,10 +137,10 @@ def _section(benchmark: Benchmark, flights: Flights, quick: bool) -> Section:
         ],
         x_label=motion.x_label,
         y_label=motion.y_label,
-        motion=[_line(curve) for curve in motion.curves],
+        motion=[Line.of(curve) for curve in motion.curves],
         error_label=flown(nominal).error.label,
-        errors={"RK4": _line(flown(nominal).error)}
-        | {name: _line(other.error) for name, other in others.items()},  # type: ignore[arg-type]
+        errors={"RK4": Line.of(flown(nominal).error)}
+        | {name: Line.of(other.error) for name, other in others.items()},  # type: ignore[arg-type]
     )
 
 
@@ -174,9 +173,3 @@ def _injected(benchmark: Benchmark, fault: Fault, readings: Readings) -> Injecte
         wanted=fault in benchmark.catches,
         broken=[b.quantity for b in benchmark.bounds if not b.admits(readings.values[b.quantity])],
     )
-
-
-def _line(curve: Curve) -> Line:
-    """Return a curve with six digits, as much as a figure can show."""
-    x, y = ([float(f"{value:.6g}") for value in values] for values in (curve.x, curve.y))
-    return Line(label=curve.label, x=x, y=y, dots=curve.dots)
