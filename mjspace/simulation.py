@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from mjspace import environment
+from mjspace import environment, mujoco_log
 from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Reference
 from mjspace.errors import FlightError
@@ -92,13 +92,6 @@ def fly(
         period += len(tape)
 
 
-def _quiet_mujoco() -> None:
-    """Let MuJoCo neither print its warnings nor write them to a file: the loop reports them."""
-    config = mujoco.MjLogConfig.get()
-    config.logto_console = config.logto_file = False
-    mujoco.MjLogConfig.set(config)
-
-
 class _Flight:
     """The batch in flight, and what the sensors and the law remember."""
 
@@ -106,7 +99,7 @@ class _Flight:
         self, assembly: Assembly, start: Start, members: Sequence[int], threads: int
     ) -> None:
         scenario = assembly.scenario
-        _quiet_mujoco()
+        mujoco_log.silence()
         environment.install()
         self.assembly = assembly
         self.columns = Columns(assembly)

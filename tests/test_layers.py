@@ -32,7 +32,7 @@ ONLY_IN = {
             "tape",
             "recorder",
         ),
-        *("stand", "meter", "passport", "basilisk"),
+        *("mujoco_log", "stand", "meter", "passport", "convergence"),
         *("geometry", "offscreen", "render", "stage", "replay", "environments", "dm_bridge"),
     ),
     "mcap": ("log_*",),

@@ -14,7 +14,7 @@ import numpy as np
 from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.validation import stand
-from mjspace.validation.benchmark import Conditions, Picture
+from mjspace.validation.benchmark import Bound, Conditions, Picture
 from mjspace.validation.results import Line, Results, Row, Section
 
 STEP, DURATION, EVERY = 1e-3, 60.0, 0.5  # s
@@ -28,9 +28,9 @@ _BOUNDS = (
         1e-10,
         "both are RK4 at one step: what is left is rounding; 6e-14 measured",
     ),
-    ("rate", "rad/s", 1e-10, "as the attitude; 2e-15 measured"),
-    ("gimbal angle", "rad", 1e-10, "as the attitude; 1e-13 measured"),
-    ("wheel angle", "rad", 1e-10, "some 700 turns: rounding of 4400 rad; 1e-11 measured"),
+    Bound("rate", "rad/s", 1e-10, "as the attitude; 2e-15 measured"),
+    Bound("gimbal angle", "rad", 1e-10, "as the attitude; 1e-13 measured"),
+    Bound("wheel angle", "rad", 1e-10, "some 700 turns: rounding of 4400 rad; 1e-11 measured"),
 )
 
 
@@ -78,18 +78,7 @@ def compare(python: str) -> Section:
         ),
         source="Basilisk's chain of spinning bodies under its own RK4; the lines are Basilisk's",
         step=STEP,
-        rows=[
-            Row(
-                quantity=quantity,
-                unit=unit,
-                measured=value,
-                target=0.0,
-                allowed=allowed,
-                reason=reason,
-                passed=bool(value <= allowed),
-            )
-            for (quantity, unit, allowed, reason), value in zip(_BOUNDS, measured, strict=True)
-        ],
+        rows=[Row.judged(*pair) for pair in zip(_BOUNDS, measured, strict=True)],
         faults=[],
         x_label=motion.x_label,
         y_label=motion.y_label,

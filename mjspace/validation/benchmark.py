@@ -43,7 +43,7 @@ class Bound:
 
     def admits(self, measured: float) -> bool:
         """Tell whether ``measured`` is within the bound; NaN is not."""
-        return abs(measured - self.target) <= self.allowed
+        return bool(abs(measured - self.target) <= self.allowed)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ Convergence = list[tuple[float, float]]
 """Steps [s], each half of the one before, and how fast the attitude, or a fixed base's joints, go
 wrong at each, seen from half of it [rad/s]."""
 _FINE, _COARSE = 1e-9, 1e-3  # rad/s: errors between which convergence is watched
+_ROUNDING = 1e-13  # rad/s: errors that no step makes smaller
 
 
 def observe(model: Any, start: Any) -> Convergence:
@@ -38,16 +39,27 @@ def observe(model: Any, start: Any) -> Convergence:
 
 
 def slope(found: Convergence) -> float:
-    """Return the observed order: the slope of log error over log step at the finest three."""
-    steps, errors = np.log(np.maximum(found[-3:], 1e-300)).T
+    """Return the observed order: the slope of log error over log step at the finest three.
+
+    NaN where less than two errors can be told from rounding.
+    """
+    seen = [pair for pair in found if pair[1] > _ROUNDING][-3:]
+    if len(seen) < 2:
+        return math.nan
+    steps, errors = np.log(seen).T
     return float(np.polyfit(steps, errors, 1)[0])
 
 
 def step_for(found: Convergence, goal: float, duration: float) -> float:
-    """Return the step [s] that errs by ``goal`` [rad] in ``duration`` [s], as far as is known."""
-    order, (step, error) = slope(found), found[-1]
+    """Return the step [s] that errs by ``goal`` [rad] in ``duration`` [s], as far as is known.
+
+    No step longer than the coarsest that was seen to do.
+    """
+    order, (step, error), coarsest = slope(found), found[-1], found[0][0]
+    if math.isnan(order):
+        return coarsest
     in_all = error * duration / (1.0 - 2.0**-order)  # half the step has an error of its own
-    return float(min(step * (goal / in_all) ** (1.0 / order), found[0][0]))
+    return float(min(step * (goal / in_all) ** (1.0 / order), coarsest))
 
 
 def _end(model: Any, start: Any, duration: float, step: float) -> Array:

@@ -1,11 +1,13 @@
 """What ``mjspace validate`` found out, as data: written to JSON, read by the report's pages."""
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, computed_field
 
-from mjspace.validation.benchmark import Curve, Fault, Integrator
+from mjspace.validation.benchmark import Bound, Curve, Fault, Integrator
 
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 """JSON has no NaN: null stands for it."""
@@ -28,6 +30,22 @@ class Row(Data):
     reason: str
     passed: bool
     others: dict[Integrator, Number] = {}
+
+    @staticmethod
+    def judged(
+        bound: Bound, measured: float, others: Mapping[Integrator, float] = MappingProxyType({})
+    ) -> "Row":
+        """Return what was measured with the bound's verdict on it."""
+        return Row(
+            quantity=bound.quantity,
+            unit=bound.unit,
+            measured=measured,
+            target=bound.target,
+            allowed=bound.allowed,
+            reason=bound.reason,
+            passed=bound.admits(measured),
+            others=dict(others),
+        )
 
 
 class Injected(Data):

@@ -1,13 +1,14 @@
 """Flies the benchmarks: as they should be, under other integrators, at other steps, with faults."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
 
+from mjspace import mujoco_log
 from mjspace.provenance import software
 from mjspace.validation import benchmarks
 from mjspace.validation.benchmark import (
@@ -24,7 +25,7 @@ ORDER, ORDER_ALLOWED = 4.0, 0.1
 """RK4's order of convergence, and how far from it an observed one may be."""
 _EVERYWHERE: tuple[Fault, ...] = ("armature", "integrator", "held", "inertia")
 
-Flights = dict[tuple[str, Conditions], Readings]
+Flight = tuple[Benchmark, Conditions]
 
 
 def chosen(names: Sequence[str]) -> list[Benchmark]:
@@ -45,36 +46,42 @@ def validate(
     *,
     quick: bool = False,
     progress: Callable[[float], None] = lambda done: None,
+    fly_all: Callable[[Sequence[Flight]], Iterable[tuple[Flight, Readings]]] | None = None,
 ) -> Results:
-    """Fly all that the benchmarks ask for, on every core, and judge it.
+    """Fly all that the benchmarks ask for and judge it.
 
-    ``quick`` flies each benchmark once, short. ``progress`` is told the fraction done.
+    ``quick`` flies each benchmark once, short. ``progress`` is told the fraction done. ``fly_all``
+    yields flights with their readings, in any order; every core is used when left out.
     """
-    flights: Flights = {}
-    planned = [(b.name, c) for b in wanted for c in _plan(b, quick)]
+    planned = [(b, c) for b in wanted for c in _plan(b, quick)]
     # The first of a plan is the longest: begun first, it does not keep the others waiting.
     planned.sort(key=lambda flight: flight[1].short)
-    workers = min(os.cpu_count() or 1, len(planned))
-    # A fresh process each, for callbacks are global and threads do not survive a fork.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(_fly, *flight): flight for flight in planned}
-        try:
-            for count, future in enumerate(as_completed(futures), start=1):
-                flights[futures[future]] = future.result()
-                progress(count / len(planned))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    flown: dict[tuple[str, Conditions], Readings] = {}
+    for (benchmark, conditions), readings in (fly_all or on_every_core)(planned):
+        flown[benchmark.name, conditions] = readings
+        progress(len(flown) / len(planned))
     return Results(
         versions=software(),
         quick=quick,
-        sections=[_section(benchmark, flights, quick) for benchmark in wanted],
+        sections=[
+            _section(b, {c: flown[b.name, c] for c in _plan(b, quick)}, quick) for b in wanted
+        ],
     )
 
 
-def _fly(name: str, conditions: Conditions) -> Readings:
-    (benchmark,) = chosen([name])
-    return benchmark.fly(conditions)
+def on_every_core(planned: Sequence[Flight]) -> Iterator[tuple[Flight, Readings]]:
+    """Yield each flight when it is done, with its readings."""
+    workers = min(os.cpu_count() or 1, len(planned))
+    # A fresh process each, for callbacks are global and threads do not survive a fork.
+    fresh = get_context("spawn")
+    with ProcessPoolExecutor(workers, fresh, initializer=mujoco_log.silence) as pool:
+        futures = {pool.submit(b.fly, c): (b, c) for b, c in planned}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def _nominal(benchmark: Benchmark, quick: bool) -> Conditions:
@@ -98,30 +105,21 @@ def _injectable(benchmark: Benchmark) -> list[Fault]:
     return [fault for fault in FAULTS if fault in _EVERYWHERE or fault in benchmark.catches]
 
 
-def _section(benchmark: Benchmark, flights: Flights, quick: bool) -> Section:
+def _section(benchmark: Benchmark, flown: dict[Conditions, Readings], quick: bool) -> Section:
     nominal = _nominal(benchmark, quick)
-
-    def flown(conditions: Conditions) -> Readings:
-        return flights[benchmark.name, conditions]
-
-    others = {} if quick else {i: flown(replace(nominal, integrator=i)) for i in benchmark.others}
+    readings = flown[nominal]
+    others = {} if quick else {i: flown[replace(nominal, integrator=i)] for i in benchmark.others}
     rows = [
-        Row(
-            quantity=bound.quantity,
-            unit=bound.unit,
-            measured=flown(nominal).values[bound.quantity],
-            target=bound.target,
-            allowed=bound.allowed,
-            reason=bound.reason,
-            passed=bound.admits(flown(nominal).values[bound.quantity]),
-            others={name: other.values[bound.quantity] for name, other in others.items()},
+        Row.judged(
+            bound,
+            readings.values[bound.quantity],
+            {name: other.values[bound.quantity] for name, other in others.items()},
         )
         for bound in benchmark.bounds
     ]
     if benchmark.order and not quick:
-        at = {step: flown(Conditions(step, short=True)) for step in benchmark.order.steps}
+        at = {step: flown[Conditions(step, short=True)] for step in benchmark.order.steps}
         rows += [_order(quantity, at) for quantity in benchmark.order.quantities]
-    motion = flown(nominal).motion
     return Section(
         name=benchmark.name,
         title=benchmark.title,
@@ -132,14 +130,14 @@ def _section(benchmark: Benchmark, flights: Flights, quick: bool) -> Section:
         faults=[]
         if quick
         else [
-            _injected(benchmark, fault, flown(replace(nominal, fault=fault, short=True)))
+            _injected(benchmark, fault, flown[replace(nominal, fault=fault, short=True)])
             for fault in _injectable(benchmark)
         ],
-        x_label=motion.x_label,
-        y_label=motion.y_label,
-        motion=[Line.of(curve) for curve in motion.curves],
-        error_label=flown(nominal).error.label,
-        errors={"RK4": Line.of(flown(nominal).error)}
+        x_label=readings.motion.x_label,
+        y_label=readings.motion.y_label,
+        motion=[Line.of(curve) for curve in readings.motion.curves],
+        error_label=readings.error.label,
+        errors={"RK4": Line.of(readings.error)}
         | {name: Line.of(other.error) for name, other in others.items()},  # type: ignore[arg-type]
     )
 
@@ -147,23 +145,10 @@ def _section(benchmark: Benchmark, flights: Flights, quick: bool) -> Section:
 def _order(quantity: str, at: dict[float, Readings]) -> Row:
     steps = list(at)
     errors = [readings.values[quantity] for readings in at.values()]
-    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-    bound = Bound(
-        f"order of {quantity}",
-        "",
-        ORDER_ALLOWED,
-        f"RK4's order, as the slope over steps of {', '.join(f'{step:g}' for step in steps)} s",
-        ORDER,
-    )
-    return Row(
-        quantity=bound.quantity,
-        unit="",
-        measured=slope,
-        target=bound.target,
-        allowed=bound.allowed,
-        reason=bound.reason,
-        passed=bound.admits(slope),
-    )
+    seen = all(0.0 < error < np.inf for error in errors)
+    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0]) if seen else np.nan
+    reason = f"RK4's order: the slope over steps of {', '.join(f'{step:g}' for step in steps)} s"
+    return Row.judged(Bound(f"order of {quantity}", "", ORDER_ALLOWED, reason, ORDER), slope)
 
 
 def _injected(benchmark: Benchmark, fault: Fault, readings: Readings) -> Injected:

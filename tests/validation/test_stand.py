@@ -1,0 +1,112 @@
+"""The test stand: loads at every stage, loads held, faults that are really in the model."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjspace.contract import Array
+from mjspace.tables import Environment, Orbit
+from mjspace.validation import meter, stand
+from mjspace.validation.benchmark import Conditions
+
+ORBIT = Environment(orbit=Orbit(semi_major_axis=7.0e6))
+STEP = Conditions(0.05)
+
+
+def pushed(model: Any, data: Any, time: float) -> Array:
+    """A torque about z that grows with the square of time: RK4 integrates it without error."""
+    force = np.zeros(model.nv)
+    force[5] = 14.0 * time**2
+    return force
+
+
+def rate_after_a_second(conditions: Conditions) -> float:
+    model = stand.build(conditions, "tumbler")
+    record = stand.fly(conditions, model, stand.start(model), 1.0, load=pushed)
+    return float(record.qvel[-1, 5])
+
+
+def test_loads_are_evaluated_at_every_stage() -> None:
+    assert rate_after_a_second(STEP) == pytest.approx(1.0 / 3.0, rel=1e-14)
+
+
+def test_a_held_load_is_that_of_the_start_of_its_step() -> None:
+    starts = 0.05 * np.arange(20)
+    held = rate_after_a_second(Conditions(0.05, fault="held"))
+    assert held == pytest.approx(np.sum(starts**2) * 0.05, rel=1e-14)
+
+
+def test_the_native_environment_can_be_held_too() -> None:
+    ends = []
+    for fault in (None, "held"):
+        conditions = Conditions(20.0, fault=fault)
+        model = stand.build(conditions, "tumbler", outside=ORBIT)
+        data = stand.start(model, ORBIT)
+        data.qpos[3:7] = [0.9, 0.1, 0.4, 0.1]
+        ends.append(stand.fly(conditions, model, data, 2000.0).qvel[-1, 3:6])
+    assert 1e-6 < np.linalg.norm(ends[1] - ends[0]) < 0.1 * np.linalg.norm(ends[0])
+
+
+def test_the_environment_is_back_after_a_load() -> None:
+    rate_after_a_second(STEP)
+    model = stand.build(STEP, "tumbler", outside=ORBIT)
+    data = stand.start(model, ORBIT)
+    data.qpos[3:7] = [0.9, 0.1, 0.4, 0.1]
+    mujoco.mj_forward(model, data)
+    assert np.any(data.qfrc_passive)
+
+
+def test_faults_are_in_the_model() -> None:
+    sound, heavy, uneven = (
+        stand.build(Conditions(0.05, fault=fault), "tumbler")
+        for fault in (None, "armature", "inertia")
+    )
+    np.testing.assert_allclose(heavy.dof_armature[3:6], [1.0, 1.2, 1.4], rtol=1e-15)
+    # MuJoCo's own order of the principal moments
+    np.testing.assert_allclose(uneven.body_inertia[1] / sound.body_inertia[1], [1.01, 0.99, 1.01])
+    assert stand.build(Conditions(0.05, fault="integrator"), "tumbler").opt.integrator == 0
+    jointed = stand.build(Conditions(0.05, fault="armature"), "offset_gimbals")
+    assert np.all(jointed.dof_armature[:6] == 0.0)
+    assert np.all(jointed.dof_armature[6:] > 0.0)
+
+
+def test_a_flight_that_is_lost_ends_with_what_is_not_finite() -> None:
+    def mad(model: Any, data: Any, time: float) -> Array:
+        return np.full(model.nv, np.nan if time > 0.5 else 0.0)
+
+    model = stand.build(STEP, "tumbler")
+    record = stand.fly(STEP, model, stand.start(model), 1.0, load=mad)
+    assert record.time[-1] < 0.7
+    assert not np.all(np.isfinite(record.qvel[-1]))
+    assert np.all(np.isfinite(record.qvel[:-1]))
+
+
+def test_the_meter_agrees_with_mujoco() -> None:
+    model = stand.build(STEP, "offset_gimbals")
+    data = stand.start(model)
+    data.qvel[:] = np.random.default_rng(1).normal(size=model.nv)
+    record = stand.fly(STEP, model, data, 0.5, samples=5)
+    for row in range(len(record.time)):
+        data.qpos[:], data.qvel[:] = record.qpos[row], record.qvel[row]
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        mujoco.mj_energyVel(model, data)
+        total = model.body_mass.sum() * data.subtree_linvel[0]
+        for ours, theirs in (
+            (meter.angular_momentum(record)[row], data.subtree_angmom[0]),
+            (meter.linear_momentum(record)[row], total),
+            (meter.centre_of_mass(record)[row], data.subtree_com[0]),
+        ):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
+        assert meter.kinetic_energy(record)[row] == pytest.approx(data.energy[1], rel=1e-12)
+
+
+def test_phases_join_to_one_record() -> None:
+    model = stand.build(STEP, "tumbler")
+    data = stand.start(model)
+    parts = [stand.fly(STEP, model, data, 1.0, samples=4) for _ in range(2)]
+    whole = stand.joined(*parts)
+    np.testing.assert_allclose(whole.time, np.arange(9) * 0.25, atol=1e-12)
+    assert whole.qpos.shape == (9, 7)

@@ -1,0 +1,168 @@
+"""The suite's judgement: what passes, what must fail, and that the same comes out every time."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mjspace.validation import suite
+from mjspace.validation.benchmark import (
+    FAULTS,
+    Benchmark,
+    Bound,
+    Conditions,
+    Curve,
+    Order,
+    Picture,
+    Readings,
+)
+from mjspace.validation.benchmarks import ALL
+from mjspace.validation.results import Injected, Results
+
+TIME = np.linspace(0.0, 1.0, 3)
+
+
+def readings(error: float, rate: float) -> Readings:
+    curve = Curve("x", TIME, error * TIME)
+    return Readings({"error": error, "rate": rate}, Picture("t", "x", (curve,)), curve)
+
+
+def fourth_order(conditions: Conditions) -> Readings:
+    """Err as RK4 does, and by a lot with armature or under another integrator."""
+    spoiled = conditions.fault == "armature" or conditions.integrator != "RK4"
+    return readings(1.0 if spoiled else 1e-3 * conditions.step**4, 0.25)
+
+
+def blind(conditions: Conditions) -> Readings:
+    """Measure the same whatever happens."""
+    return readings(0.0, 0.25)
+
+
+def second_order(conditions: Conditions) -> Readings:
+    return readings(1e-3 * conditions.step**2, 0.25)
+
+
+def lost(conditions: Conditions) -> Readings:
+    return readings(np.nan, 0.25)
+
+
+FAKE = Benchmark(
+    name="fake",
+    title="A fake",
+    shows="Nothing.",
+    source="none",
+    step=0.1,
+    bounds=(
+        Bound("error", "rad", 1e-6, "because"),
+        Bound("rate", "rad/s", 0.01, "because", target=0.25),
+    ),
+    fly=fourth_order,
+    catches={"armature": "a heavy joint"},
+    order=Order(("error",), (0.4, 0.2, 0.1)),
+    others=("Euler",),
+)
+
+
+def here(planned: Sequence[suite.Flight]) -> Iterator[tuple[suite.Flight, Readings]]:
+    """Fly in this process: another takes seconds to start."""
+    for benchmark, conditions in planned:
+        yield (benchmark, conditions), benchmark.fly(conditions)
+
+
+def validated(fly: Callable[[Conditions], Readings]) -> Results:
+    return suite.validate([replace(FAKE, fly=fly)], fly_all=here)
+
+
+def test_a_good_benchmark_passes_with_everything_measured() -> None:
+    results = validated(fourth_order)
+    assert results.passed
+    (section,) = results.sections
+    measured = {row.quantity: row.measured for row in section.rows}
+    assert measured == pytest.approx({"error": 1e-7, "rate": 0.25, "order of error": 4.0})
+    assert section.rows[0].others == {"Euler": 1.0}
+    caught = {injected.fault: injected.broken for injected in section.faults}
+    # what is not of this benchmark is not flown
+    assert caught == {"armature": ["error"], "integrator": [], "held": [], "inertia": []}
+    assert section.faults[0].meaning == "a heavy joint"
+
+
+def test_a_benchmark_that_misses_its_fault_fails() -> None:
+    (section,) = validated(blind).sections
+    assert [row.passed for row in section.rows[:2]] == [True, True]
+    assert [injected.fault for injected in section.missed] == ["armature"]
+    assert not section.passed
+
+
+def test_a_wrong_order_fails() -> None:
+    (section,) = validated(second_order).sections
+    row = section.rows[-1]
+    assert row.quantity == "order of error"
+    assert row.measured == pytest.approx(2.0)
+    assert not row.passed
+
+
+def test_what_is_not_a_number_is_out_of_bounds() -> None:
+    (section,) = validated(lost).sections
+    assert not section.rows[0].passed
+    assert section.rows[1].passed
+
+
+def test_quick_flies_each_benchmark_once() -> None:
+    told: list[float] = []
+    results = suite.validate([FAKE], quick=True, progress=told.append, fly_all=here)
+    assert told == [1.0]
+    assert results.sections[0].faults == []
+    assert [row.quantity for row in results.sections[0].rows] == ["error", "rate"]
+
+
+def test_results_survive_json() -> None:
+    results = validated(lost)
+    again = Results.model_validate_json(results.model_dump_json())
+    assert np.isnan(again.sections[0].rows[0].measured)
+    assert again.model_dump_json() == results.model_dump_json()
+    assert not again.passed
+
+
+def test_only_what_is_named_is_chosen() -> None:
+    names = [benchmark.name for benchmark in ALL]
+    assert [b.name for b in suite.chosen([])] == names
+    assert len(set(names)) == len(names)
+    assert [b.name for b in suite.chosen([names[1], names[0]])] == names[:2]
+    with pytest.raises(ValueError, match=f"no benchmark 'nope': have {names[0]}"):
+        suite.chosen(["nope"])
+
+
+@pytest.mark.parametrize("benchmark", ALL, ids=lambda benchmark: benchmark.name)
+def test_a_benchmark_is_written_in_full(benchmark: Benchmark) -> None:
+    assert benchmark.catches, "a benchmark that catches nothing proves nothing"
+    assert set(benchmark.catches) <= set(FAULTS)
+    for fault in ("sign", "erratum"):
+        assert benchmark.catches.get(fault, "what it is"), fault
+    for bound in benchmark.bounds:
+        assert bound.reason
+        assert bound.allowed > 0.0
+    quantities = {bound.quantity for bound in benchmark.bounds}
+    assert not benchmark.order or set(benchmark.order.quantities) <= quantities
+    steps = benchmark.order.steps if benchmark.order else (4.0, 2.0, 1.0)
+    assert len(steps) >= 3
+    np.testing.assert_allclose(np.diff(np.log2(steps)), -1.0)
+
+
+def test_a_flight_is_the_same_every_time() -> None:
+    wanted = suite.chosen(["torque-free"])
+    once = suite.validate(wanted, quick=True)  # in processes of its own
+    again = suite.validate(wanted, quick=True, fly_all=here)
+    assert once.model_dump_json() == again.model_dump_json()
+
+
+@pytest.mark.slow
+def test_every_benchmark_holds_and_catches_exactly_what_it_claims() -> None:
+    results = suite.validate(suite.chosen([]))
+    for section in results.sections:
+        assert [row for row in section.rows if not row.passed] == []
+        assert [i for i in section.faults if i.wanted != bool(i.broken)] == [], section.name
+    assert results.passed
+    injected: list[Injected] = [i for section in results.sections for i in section.faults]
+    for fault in FAULTS:
+        assert any(i.fault == fault and i.broken for i in injected), f"nobody catches {fault}"
