@@ -1,0 +1,43 @@
+"""The magnetic field of a planet, a dipole at its centre, compiled for native callbacks."""
+
+import math
+from typing import Any
+
+from numba import njit
+
+# Of the Earth: Alken et al. 2021, International Geomagnetic Reference Field, the thirteenth
+# generation; the terms of degree 1 at epoch 2020.0, reference radius 6371.2 km.
+_G10, _G11, _H11 = -29404.8e-9, -1450.9e-9, 4652.5e-9  # T
+
+EARTH_STRENGTH = math.hypot(_G10, _G11, _H11) * 6371.2e3**3  # T m^3
+EARTH_TILT = math.atan2(math.hypot(_G11, _H11), -_G10)  # rad
+EARTH_LONGITUDE = math.atan2(-_H11, -_G11)  # rad, of the northern pole
+EARTH_ROTATION = 7.292115e-5  # rad/s; Moritz 2000, Geodetic Reference System 1980
+
+
+@njit(cache=True, error_model="numpy")
+def dipole(place: Any, north: Any, strength: float) -> tuple[float, float, float]:
+    """Return the field [T] at ``place`` [m] from the planet's centre.
+
+    ``north`` is the unit vector to the northern magnetic pole, where the field points down, and
+    ``strength`` [T m^3] the field on the magnetic equator times the radius cubed; all in the same
+    axes. Wertz 1978, Spacecraft Attitude Determination and Control, appendix H.
+    """
+    x, y, z = place[0], place[1], place[2]
+    radius2 = x * x + y * y + z * z
+    scale = strength / (radius2 * math.sqrt(radius2))
+    up = 3.0 * (north[0] * x + north[1] * y + north[2] * z) / radius2
+    return scale * (north[0] - up * x), scale * (north[1] - up * y), scale * (north[2] - up * z)
+
+
+@njit(cache=True, error_model="numpy")
+def northern_pole(
+    time: float, tilt: float, longitude: float, rotation: float
+) -> tuple[float, float, float]:
+    """Return the unit vector to the northern magnetic pole, inertial axes, at ``time`` [s].
+
+    It is ``tilt`` [rad] off the z axis, about which the planet turns at ``rotation`` [rad/s];
+    ``longitude`` [rad], from the x axis, is the pole's at time zero.
+    """
+    turned = longitude + rotation * time
+    return math.sin(tilt) * math.cos(turned), math.sin(tilt) * math.sin(turned), math.cos(tilt)
