@@ -1,7 +1,7 @@
 # The set-up happens by itself, once, and again when what it reads changes.
 bin := .venv/bin
 
-.PHONY: run test lint format constraints clean
+.PHONY: run test lint format validation constraints clean
 
 run: .venv/run.done
 	$(bin)/mjspace run contraction-adaptive --plot --video
@@ -17,6 +17,16 @@ lint: .venv/dev.done
 format: .venv/dev.done
 	$(bin)/ruff check --fix
 	$(bin)/ruff format
+
+# What docs/validation.md says, measured again; Basilisk and its packages live apart from ours.
+validation: .venv/dev.done build/basilisk.done
+	$(bin)/mjspace validate --basilisk build/basilisk/bin/python --out build/validation
+	$(bin)/python tools/validation_page.py build/validation/validation.json docs/validation.md
+
+build/basilisk.done: .venv/dev.done
+	$(bin)/uv venv -q --clear build/basilisk
+	$(bin)/uv pip install -q --python build/basilisk bsk==2.12.1
+	touch $@
 
 # Who can develop can also fly.
 .venv/%.done: pyproject.toml constraints.txt tools/setup
