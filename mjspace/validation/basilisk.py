@@ -21,8 +21,8 @@ STEP, DURATION, EVERY = 1e-3, 60.0, 0.5  # s
 RATE = (-0.1, -0.05, 0.2)  # rad/s, of the bus
 HINGES = ("outer", "inner", "wheel")
 HINGE_RATES = (0.01, -0.05, 73.0)  # rad/s; those of the thesis on the double-gimbal CMG, Table 2.1
-_BOUNDS = (
-    (
+_BOUNDS: tuple[Bound, ...] = (
+    Bound(
         "attitude",
         "rad",
         1e-10,
@@ -78,7 +78,7 @@ def compare(python: str) -> Section:
         ),
         source="Basilisk's chain of spinning bodies under its own RK4; the lines are Basilisk's",
         step=STEP,
-        rows=[Row.judged(*pair) for pair in zip(_BOUNDS, measured, strict=True)],
+        rows=[Row.judged(b, float(m)) for b, m in zip(_BOUNDS, measured, strict=True)],
         faults=[],
         x_label=motion.x_label,
         y_label=motion.y_label,

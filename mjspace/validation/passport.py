@@ -1,8 +1,8 @@
 """The physics passport of any MJCF model: guards, conservation, order of convergence, step advice.
 
-The model is flown free, without gravity, contact or control: moving as its first keyframe says and,
-where that leaves a speed at zero, at a tenth of a radian or metre per second. What is conserved then
-shows how far its integrator and step can be trusted.
+The model is flown free, without gravity, contact or control: moving as its first keyframe says
+and, where that leaves a speed at zero, at a tenth of a radian or metre per second. What is
+conserved then shows how far its integrator and step can be trusted.
 """
 
 import copy
