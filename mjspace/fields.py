@@ -33,6 +33,7 @@ class Si:
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
 Seconds = Annotated[Positive, Si("s")]

@@ -8,19 +8,14 @@ velocity in BODY axes. The body origin is the vehicle's centre of mass, but for 
 import gzip
 import warnings
 from dataclasses import dataclass, replace
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from mjspace import guards, mass
+from mjspace import composition, guards, mass
 from mjspace.contract import Array
 from mjspace.tables import Initial, PlantTable, Rates
-
-_ASSETS = Path(str(files("mjspace.assets")))
-_WHEEL_GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
 
 
 class UnphysicalInertiaWarning(UserWarning):
@@ -58,21 +53,19 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
     """Return the vehicle that ``table`` describes; its state has ``userdata`` numbers of user data.
 
     Raises:
-        ValueError: an unknown model, wheels that leave no inertia for the bus or that no rotor can
-            be, or what ``guards.check`` refuses.
+        ValueError: an unknown model or part, wheels that leave no inertia for the bus or that no
+            rotor can be, or what ``guards.check`` refuses.
 
     Warns:
         UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown as given.
     """
-    spec = _load(table.model)
+    spec = composition.compose(table)
     spec.option.timestep = rates.physics
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
     spec.nuserdata = userdata
 
     wheels = table.wheels
     axes = mass.unit_axes(wheels)
-    for index in range(len(axes)):
-        _attach_wheel(spec, table, index)
     body = spec.body("bus")
     inertial, gyrostat = mass.bus(table, mass.tensor(body.inertia, body.iquat))
     model = _compile(spec, inertial)
@@ -153,38 +146,6 @@ def from_bytes(data: bytes) -> Any:
     return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": gzip.decompress(data)})
 
 
-def _load(name: str) -> Any:
-    scene = _ASSETS / name / "scene.xml"
-    if not scene.is_file():
-        known = ", ".join(sorted(path.parent.name for path in _ASSETS.glob("*/scene.xml")))
-        raise ValueError(f"plant.model: no model {name!r}: have {known}")
-    return mujoco.MjSpec.from_file(str(scene))
-
-
-def _attach_wheel(spec: Any, table: PlantTable, index: int) -> None:
-    """Bolt wheel ``index`` to the bus, its z axis along the spin axis."""
-    wheels, name = table.wheels, f"wheel_{index}"
-    axis = mass.unit_axes(wheels)[index]
-    part = mujoco.MjSpec.from_file(str(_ASSETS / "parts/reaction_wheel/reaction_wheel.xml"))
-    rotor, joint, motor = part.body("rotor"), part.joint("spin"), part.actuator("motor")
-    rotor.mass, rotor.ipos, rotor.inertia, rotor.iquat = mass.rotor(wheels)
-    joint.damping = [wheels.viscous_friction, 0.0, 0.0]  # linear, quadratic, cubic
-    if wheels.torque_limit is not None:
-        motor.ctrllimited = True
-        motor.ctrlrange = [-wheels.torque_limit, wheels.torque_limit]
-
-    mount = spec.body("bus").add_frame()
-    mujoco.mju_quatZ2Vec(mount.quat, axis)
-    if wheels.positions is not None:
-        mount.pos = wheels.positions[index]
-    else:
-        reach = _exit(spec.geom("bus_hull").size, axis) + _WHEEL_GAP
-        for geom in part.geoms:
-            geom.pos[2] += reach
-    spec.attach(part, prefix=f"{name}_", frame=mount)
-    rotor.name = joint.name = motor.name = motor.target = name
-
-
 def _compile(spec: Any, inertial: mass.Inertial) -> Any:
     body, moments = spec.body("bus"), inertial.inertia
     body.mass, body.ipos, _, body.iquat = inertial
@@ -222,12 +183,6 @@ def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
             f"give wheel_speed, or plant.wheels.axes that span it"
         )
     return speeds
-
-
-def _exit(half_size: Array, axis: Array) -> float:
-    """Return how far from its centre [m] a ray along ``axis`` leaves a box of that half size."""
-    with np.errstate(divide="ignore"):
-        return float(np.min(half_size / np.abs(axis)))
 
 
 def _addresses(model: Any, wheels: int) -> dict[str, Any]:

@@ -6,7 +6,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from mjspace.fields import Seconds, Table, Time
 from mjspace.quantity import any_to_si, whole_number
-from mjspace.tables import Environment, Initial, PlantTable, Rates, Sensors
+from mjspace.sensor_tables import Sensors
+from mjspace.tables import Environment, Initial, PlantTable, Rates
 
 
 class Component(BaseModel):

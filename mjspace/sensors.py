@@ -11,7 +11,8 @@ import numpy as np
 from mjspace.contract import Array, Measurement
 from mjspace.noise import normals
 from mjspace.quantity import whole_number
-from mjspace.tables import Rates, RateSensor, Sensors, StarTracker
+from mjspace.sensor_tables import RateSensor, Sensors, StarTracker
+from mjspace.tables import Rates
 
 State = dict[str, Array]
 """What the sensors remember, vehicle axis first. Each one that is not ideal has

@@ -107,7 +107,8 @@ class _Flight:
         self.sensors, self.law_state = start.sensors, start.law
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
         self.batch.state[:] = start.physics
-        self.ctrl, self.sensordata = self.batch.bind("ctrl"), self.batch.bind("sensordata")
+        self.ctrl = self.batch.bind("ctrl")[:, : len(assembly.vehicle.wheel_axes)]
+        self.sensordata = self.batch.bind("sensordata")
         self.push = None
         if assembly.disturbance is not None:
             bus = assembly.vehicle.model.body("bus").id

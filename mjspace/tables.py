@@ -1,4 +1,4 @@
-"""The tables of a scenario: rates, plant, initial state, environment and sensors."""
+"""The tables of a scenario: rates, plant, initial state and environment."""
 
 from typing import Annotated, Literal
 
@@ -12,6 +12,7 @@ from mjspace.fields import (
     Matrix3,
     Meters3,
     Momentum3,
+    Name,
     NonNegative,
     Positive,
     Quaternion,
@@ -19,7 +20,6 @@ from mjspace.fields import (
     Seconds,
     Si,
     Table,
-    Time,
     Torque3,
     Unit3,
     Velocity3,
@@ -80,6 +80,17 @@ class Wheels(Table):
         return self
 
 
+class Part(Table):
+    """Something bolted to the bus that moves of itself: a nutation damper, a boom, a yo-yo."""
+
+    part: str
+    """Name of a folder in assets/parts/."""
+    position: Meters3 = [0.0, 0.0, 0.0]
+    """Of its origin in the bus."""
+    euler: Angles3 = [0.0, 0.0, 0.0]
+    """Roll, pitch, yaw of its axes in the bus's."""
+
+
 class PlantTable(Table):
     """The vehicle: an assembly from assets/, with its mass properties and wheels."""
 
@@ -94,6 +105,9 @@ class PlantTable(Table):
     """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia; the
     bus inertia follows from it."""
     wheels: Wheels = Wheels()
+    parts: dict[Name, Part] = {}
+    """By a name of one's own: ``[plant.parts.damper]``. They add to the bus's mass and inertia, and
+    to neither ``gyrostat_inertia`` nor the ``inertia`` that a law is given."""
 
     @model_validator(mode="after")
     def _one_inertia(self) -> "PlantTable":
@@ -191,49 +205,3 @@ class Environment(Table):
     python: str | None = None
     """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
     inertial axes, torque [N m] in body axes), held over each integration step: first order only."""
-
-
-class SensorTiming(Table):
-    """When a sensor samples and when it reports."""
-
-    period: Seconds | None = None
-    """Time between samples, a whole number of integration steps; else the control period."""
-    delay: Time = 0.0
-    """Age of a sample when it is reported, a whole number of sample periods."""
-
-
-class StarTracker(SensorTiming):
-    """Attitude sensor; its errors are small rotations about the body axes. Ideal by default."""
-
-    noise: Annotated[NonNegative, Si("rad")] = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Annotated[NonNegative, Si("rad")] = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Annotated[NonNegative, Si("rad")] = 0.0
-    """Standard deviation that the bias's random walk has after one second."""
-    quantization: Annotated[NonNegative, Si("rad")] = 0.0
-    """Size of the least significant digit."""
-
-
-class RateSensor(SensorTiming):
-    """Gyro or tachometer. Ideal by default."""
-
-    noise: Annotated[NonNegative, Si("rad/s")] = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Annotated[NonNegative, Si("rad/s")] = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Annotated[NonNegative, Si("rad/s")] = 0.0
-    """Standard deviation that the bias's random walk has after one second."""
-    quantization: Annotated[NonNegative, Si("rad/s")] = 0.0
-    """Size of the least significant digit."""
-
-
-class Sensors(Table):
-    """The vehicle's sensors."""
-
-    attitude: StarTracker = StarTracker()
-    """Star tracker."""
-    rate: RateSensor = RateSensor()
-    """Gyro."""
-    wheel_speed: RateSensor = RateSensor()
-    """Wheel tachometers."""

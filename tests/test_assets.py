@@ -18,7 +18,7 @@ ASSETS = Path(__file__).parent.parent / "assets"
 MODELS = sorted(path.parent.name for path in ASSETS.glob("*/scene.xml"))
 FILES = sorted(ASSETS.rglob("*.xml"))
 ORDER = ["compiler", "option", "statistic", "visual", "include", "default", "asset", "worldbody"]
-ORDER += ["actuator", "sensor"]
+ORDER += ["tendon", "equality", "actuator", "sensor", "keyframe"]
 
 
 def vehicle(model: str, wheels: Wheels | None = None) -> plant.Vehicle:

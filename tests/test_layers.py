@@ -24,6 +24,7 @@ ONLY_IN = {
     "mujoco": (
         *(
             "plant",
+            "composition",
             "environment",
             "struct_offsets",
             "guards",

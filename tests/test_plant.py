@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from mjspace import guards, plant
 from mjspace.contract import Array
-from mjspace.tables import Initial, PlantTable, Rates, Wheels
+from mjspace.tables import Initial, Part, PlantTable, Rates, Wheels
 
 PAPER = [[15.0, 5.0, 5.0], [5.0, 10.0, 7.0], [5.0, 7.0, 20.0]]  # H of papers 000 and 002
 PYRAMID = [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [1.0, -1.0, 1.0]]
@@ -294,3 +294,40 @@ def test_the_table_decides_rates_and_user_data() -> None:
     assert model.opt.timestep == 2e-3
     assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     assert model.nuserdata == 7
+
+
+def test_parts_are_bolted_on_after_the_wheels() -> None:
+    parts = {
+        "damper": Part(part="tube_damper", position=[0.0, 0.8, 0.0], euler=[0.0, np.pi / 2, 0.0]),
+        "ring": Part(part="ring_damper"),
+    }
+    bare, fitted = build(), build(parts=parts)
+    assert list(fitted.wheel_dof) == list(bare.wheel_dof)
+    assert fitted.model.nv == bare.model.nv + 2
+    assert fitted.model.body_mass.sum() == pytest.approx(bare.model.body_mass.sum() + 0.1 + 1.2)
+    np.testing.assert_array_equal(fitted.inertia, bare.inertia)
+    data = mujoco.MjData(fitted.model)
+    mujoco.mj_kinematics(fitted.model, data)
+    np.testing.assert_allclose(data.body("damper_ball").xpos, [0.0, 0.8, 0.0], atol=1e-15)
+    # the tube's z is turned to the bus's x
+    np.testing.assert_allclose(data.joint("damper_slide").xaxis, [1.0, 0.0, 0.0], atol=1e-15)
+
+
+def test_a_part_with_a_constraint_has_it_enforced() -> None:
+    disabled = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    assert build().model.opt.disableflags & disabled
+    model = build(parts={"cord": Part(part="yo_yo")}).model
+    assert not model.opt.disableflags & disabled
+    assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
+
+
+def test_an_unknown_part_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(
+        ValueError, match=r"plant\.parts\.it\.part: no part 'solar_sail': have boom"
+    ):
+        build(parts={"it": Part(part="solar_sail")})
+
+
+def test_a_part_s_name_is_an_identifier() -> None:
+    with pytest.raises(ValueError, match="pattern"):
+        PlantTable(parts={"my damper": Part(part="ring_damper")})

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from mjspace.attitude import conjugate, from_rotation_vector, multiply, to_rotation_vector
 from mjspace.contract import Array, Measurement
 from mjspace.noise import normals
+from mjspace.sensor_tables import RateSensor, Sensors, StarTracker
 from mjspace.sensors import SensorSuite, State
-from mjspace.tables import Rates, RateSensor, Sensors, StarTracker
+from mjspace.tables import Rates
 
 EVERYTHING: dict[str, Any] = {"noise": 1e-2, "bias": 0.1, "bias_walk": 2e-2, "quantization": 1e-3}
 FIVE_SIGMA = 5.0  # an honest generator fails one such test in 1.7 million

@@ -1,0 +1,87 @@
+"""A vehicle's ``MjSpec``, composed from assets/: its model, its wheels, its other parts."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjspace import mass
+from mjspace.contract import Array
+from mjspace.tables import Part, PlantTable
+
+_ASSETS = Path(str(files("mjspace.assets")))
+_WHEEL_GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
+
+
+def compose(table: PlantTable) -> Any:
+    """Return the vehicle's ``MjSpec``: wheels first, so that their speeds and motors are.
+
+    Raises:
+        ValueError: an unknown model or part; wheels that no rotor can be.
+    """
+    spec = _load(table.model)
+    for index in range(len(table.wheels.axes)):
+        _attach_wheel(spec, table, index)
+    for name, part in table.parts.items():
+        _attach_part(spec, name, part)
+    if spec.equalities:
+        # A model of free bodies does without; a cord that unwinds does not.
+        spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    return spec
+
+
+def part_names() -> list[str]:
+    """Return the names of the parts to bolt to a bus: those with something that moves."""
+    found = {path.parent.name: path for path in _ASSETS.glob("parts/*/*.xml")}
+    return sorted(name for name, path in found.items() if "<joint " in path.read_text())
+
+
+def _load(name: str) -> Any:
+    scene = _ASSETS / name / "scene.xml"
+    if not scene.is_file():
+        known = ", ".join(sorted(path.parent.name for path in _ASSETS.glob("*/scene.xml")))
+        raise ValueError(f"plant.model: no model {name!r}: have {known}")
+    return mujoco.MjSpec.from_file(str(scene))
+
+
+def _attach_wheel(spec: Any, table: PlantTable, index: int) -> None:
+    """Bolt wheel ``index`` to the bus, its z axis along the spin axis."""
+    wheels, name = table.wheels, f"wheel_{index}"
+    axis = mass.unit_axes(wheels)[index]
+    part = mujoco.MjSpec.from_file(str(_ASSETS / "parts/reaction_wheel/reaction_wheel.xml"))
+    rotor, joint, motor = part.body("rotor"), part.joint("spin"), part.actuator("motor")
+    rotor.mass, rotor.ipos, rotor.inertia, rotor.iquat = mass.rotor(wheels)
+    joint.damping = [wheels.viscous_friction, 0.0, 0.0]  # linear, quadratic, cubic
+    if wheels.torque_limit is not None:
+        motor.ctrllimited = True
+        motor.ctrlrange = [-wheels.torque_limit, wheels.torque_limit]
+
+    mount = spec.body("bus").add_frame()
+    mujoco.mju_quatZ2Vec(mount.quat, axis)
+    if wheels.positions is not None:
+        mount.pos = wheels.positions[index]
+    else:
+        reach = _exit(spec.geom("bus_hull").size, axis) + _WHEEL_GAP
+        for geom in part.geoms:
+            geom.pos[2] += reach
+    spec.attach(part, prefix=f"{name}_", frame=mount)
+    rotor.name = joint.name = motor.name = motor.target = name
+
+
+def _attach_part(spec: Any, name: str, part: Part) -> None:
+    if part.part not in part_names():
+        raise ValueError(
+            f"plant.parts.{name}.part: no part {part.part!r}: have {', '.join(part_names())}"
+        )
+    child = mujoco.MjSpec.from_file(str(_ASSETS / f"parts/{part.part}/{part.part}.xml"))
+    mount = spec.body("bus").add_frame(pos=part.position)
+    mujoco.mju_euler2Quat(mount.quat, np.array(part.euler), "XYZ")  # about fixed axes
+    spec.attach(child, prefix=f"{name}_", frame=mount)
+
+
+def _exit(half_size: Array, axis: Array) -> float:
+    """Return how far from its centre [m] a ray along ``axis`` leaves a box of that half size."""
+    with np.errstate(divide="ignore"):
+        return float(np.min(half_size / np.abs(axis)))
