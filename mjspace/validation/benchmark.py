@@ -10,11 +10,11 @@ Integrator = Literal["RK4", "Euler", "implicit", "implicitfast"]
 Fault = Literal["sign", "armature", "integrator", "held", "erratum", "inertia"]
 
 FAULTS: Mapping[Fault, str] = {
-    "sign": "a wrong sign, where the benchmark says",
+    "sign": "a wrong sign, as the benchmark says",
     "armature": "a tenth of each joint's inertia as armature on top of it",
     "integrator": "MuJoCo's default integrator, Euler",
     "held": "the loads held over the step instead of evaluated at every stage",
-    "erratum": "a printed equation instead of the corrected one, where the benchmark says",
+    "erratum": "a known error left in: a printed equation or a default, as the benchmark says",
     "inertia": "the main body's principal moments off by +1, -1 and +1 %",
 }
 

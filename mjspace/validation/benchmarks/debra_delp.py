@@ -120,8 +120,8 @@ def _dots(growth: Array) -> tuple[Curve, Curve]:
     """Return the shapes as MuJoCo flew them."""
     (k1, k3), falls = SHAPES.T, growth > GROWS
     return (
-        Curve("stays, MuJoCo", k1[~falls], k3[~falls], dots=True),
-        Curve("falls, MuJoCo", k1[falls], k3[falls], dots=True),
+        Curve("stays", k1[~falls], k3[~falls], dots=True),
+        Curve("falls", k1[falls], k3[falls], dots=True),
     )
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from mjspace import attitude
 from mjspace.validation import meter, stand
 from mjspace.validation.benchmark import (
     Benchmark,
@@ -13,7 +12,7 @@ from mjspace.validation.benchmark import (
     Picture,
     Readings,
 )
-from mjspace.validation.benchmarks.dampers import Ring
+from mjspace.validation.benchmarks.dampers import Ring, nutation
 
 RING = Ring((12.0, 12.5, 8.0), axial=1.8, damping=1.08)  # as six of the part, to be over it soon
 INERTIA = np.array(RING.whole)  # kg m^2
@@ -32,8 +31,7 @@ def fall_over(conditions: Conditions) -> Readings:
     data = stand.start(model)
     data.qvel[3:6] = RATE
     record = stand.fly(conditions, model, data, DURATION, samples=DURATION)
-    h = attitude.rotate(attitude.conjugate(record.qpos[:, 3:7]), MOMENTUM)
-    angle = np.arctan2(np.hypot(h[:, 0], h[:, 1]), h[:, 2])
+    angle = nutation(MOMENTUM, record.qpos[:, 3:7])
     momentum, energy = meter.angular_momentum(record), meter.kinetic_energy(record)
     off = np.linalg.norm(momentum - momentum[0], axis=1) / np.linalg.norm(momentum[0])
     return Readings(
