@@ -51,12 +51,12 @@ def dual_spin(conditions: Conditions) -> Readings:
     frequency = np.sqrt(k1 * k2 / (I1 * I2))
     nutating = np.sqrt(I1 * k1) * w1 + 1j * np.sqrt(I2 * k2) * w2  # turns at the frequency
     phase = np.unwrap(np.angle(nutating))
-    stable = w1 / NUDGE, np.cos(frequency * time)
+    stable = np.cos(frequency * time), w1 / NUDGE
 
     other, (w1, w2), k1, k2 = nudged(*UNSTABLE)
     rate = np.sqrt(-k1 * k2 / (I1 * I2))
     growing = w1 + rate * I2 / k1 * w2  # the growing mode alone
-    unstable = w1 / NUDGE, np.cosh(rate * time)
+    unstable = np.cosh(rate * time), w1 / NUDGE
     return Readings(
         values={
             "nutation frequency": abs(phase[-1] / end - frequency),
@@ -68,7 +68,7 @@ def dual_spin(conditions: Conditions) -> Readings:
             ),
         },
         motion=Picture.of(
-            "w1, of the nudge", time, "stable unstable", *np.stack([stable, unstable], 2).T
+            "w1, of the nudge", time, "stable unstable", *np.stack([stable, unstable], axis=2)
         ),
         error=Curve("nutation phase error [rad]", time, np.abs(phase - frequency * time)),
     )
