@@ -26,9 +26,9 @@ the stage, ``data.time`` is not to be used: it has rounding that ``time`` has no
 MODELS = Path(str(files("mjspace.assets"))) / "validation"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Record:
-    """A flight, sampled: from its start to its end, both included."""
+    """A flight, sampled: from its start to its end, both included; equal to itself alone."""
 
     model: Any
     time: Array  # s, shape (n,)
