@@ -8,6 +8,7 @@ import typer
 from mjspace.errors import InputError, blamed_on
 from mjspace.options import Json
 from mjspace.terminal import progress_bar
+from mjspace.validation import workers
 
 
 def validate(
@@ -15,7 +16,8 @@ def validate(
         list[str], typer.Option("--only", metavar="NAME", help="This benchmark; repeatable.")
     ] = [],  # noqa: B006
     quick: Annotated[
-        bool, typer.Option("--quick", help="Each benchmark once, short; no faults, no orders.")
+        bool,
+        typer.Option("--quick", help="Each benchmark once, short; no faults, orders and figures."),
     ] = False,
     model: Annotated[
         Path | None, typer.Option(help="Examine this MJCF or MJB model instead.")
@@ -42,6 +44,7 @@ def validate(
             table.show_passport(issued)
         raise typer.Exit(0 if issued.passed else 1)
 
+    workers.warm_up()
     from mjspace.flight import output_folder
     from mjspace.validation import report, suite, table
     from mjspace.validation.basilisk import compared

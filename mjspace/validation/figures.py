@@ -7,6 +7,7 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from mjspace.plot_style import COLORS, FAINT, STYLE
 from mjspace.validation.benchmark import Integrator
@@ -26,9 +27,11 @@ _STYLE = STYLE | {"svg.hashsalt": "mjspace", "svg.fonttype": "none", "svg.id": "
 def svg(section: Section) -> str:
     """Return the section's figure as an SVG element."""
     with matplotlib.rc_context(_STYLE):
-        page = Figure(figsize=(10.0, 3.0), layout="constrained")
+        page = Figure(figsize=(10.0, 3.0))
         FigureCanvasSVG(page)
-        motion, error = page.subplots(1, 2, width_ratios=[1.25, 1.0])
+        # Laid out by hand, which takes a tenth of the time.
+        room = {"left": 0.075, "right": 0.99, "bottom": 0.16, "top": 0.97, "wspace": 0.22}
+        motion, error = page.subplots(1, 2, width_ratios=[1.25, 1.0], gridspec_kw=room)
         _draw_motion(motion, section)
         _draw_errors(error, section)
         buffer = io.StringIO()
@@ -65,9 +68,10 @@ def _draw_errors(axes: Any, section: Section) -> None:
         color, dashes = _INTEGRATORS[integrator]
         axes.plot(line.x, y, color=color, linestyle=dashes, label=integrator)
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:.0e}")
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.set_xlabel("time [s]")
     axes.set_ylabel(section.error_label)
-    axes.tick_params(which="minor", length=0)
     axes.grid(color=FAINT, alpha=0.25)
     if len(section.errors) > 1:
         axes.legend(fontsize=7, frameon=False, ncols=2, loc="best", handlelength=1.2)

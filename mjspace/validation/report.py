@@ -1,12 +1,11 @@
 """The results as pages: one HTML file that needs nothing else, and Markdown with its figures."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from mjspace.validation import figures, wording
+from mjspace.validation import figures, wording, workers
 from mjspace.validation.benchmark import FAULTS
 from mjspace.validation.results import Results, Section
 
@@ -16,13 +15,17 @@ JSON, HTML = "validation.json", "validation.html"
 def write(results: Results, folder: Path) -> tuple[Path, Path]:
     """Write the JSON and the HTML report into ``folder``, made if need be; return their paths.
 
+    A quick run's report has no figures: they would take longer than the flights.
+
     Raises:
         OSError: a file cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     data, page = folder / JSON, folder / HTML
     data.write_text(results.model_dump_json() + "\n")
-    page.write_text(_rendered("report.html.j2", results, figure=figures.svg))
+    page.write_text(
+        _rendered("report.html.j2", results, figures={} if results.quick else _drawn(results))
+    )
     return data, page
 
 
@@ -32,14 +35,21 @@ def write_markdown(results: Results, page: Path) -> None:
     Raises:
         OSError: a file cannot be written.
     """
-    drawn = page.with_suffix("")
-    drawn.mkdir(parents=True, exist_ok=True)
-    for section in results.sections:
-        (drawn / f"{section.name}.svg").write_text(figures.svg(section))
-    page.write_text(_rendered("report.md.j2", results, figures=drawn.name))
+    folder = page.with_suffix("")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, drawing in _drawn(results).items():
+        (folder / f"{name}.svg").write_text(drawing)
+    page.write_text(_rendered("report.md.j2", results, figures=folder.name))
 
 
-def _rendered(template: str, results: Results, **more: str | Callable[[Section], str]) -> str:
+def _drawn(results: Results) -> dict[str, str]:
+    """Return the sections' figures as SVG, by name."""
+    calls = [(figures.svg, section) for section in results.sections]
+    return {results.sections[index].name: drawing for index, drawing in workers.each(calls)}
+
+
+def _rendered(template: str, results: Results, *, figures: str | dict[str, str]) -> str:
+    """Return the page; ``figures`` are themselves, or the name of the folder that they are in."""
     environment = Environment(
         loader=PackageLoader("mjspace.validation"),
         autoescape=select_autoescape(["html.j2"]),
@@ -48,6 +58,7 @@ def _rendered(template: str, results: Results, **more: str | Callable[[Section],
     environment.filters["cell"] = lambda text: text.replace("|", "\\|")
     words: dict[str, Any] = {
         "results": results,
+        "figures": figures,
         "faults": FAULTS,
         "others": wording.OTHERS,
         "measured": wording.measured,
@@ -55,7 +66,7 @@ def _rendered(template: str, results: Results, **more: str | Callable[[Section],
         "under": wording.under,
         "anchor": _anchor,
     }
-    return environment.get_template(template).render(words | more)
+    return environment.get_template(template).render(words)
 
 
 def _anchor(section: Section) -> str:

@@ -1,16 +1,12 @@
 """Flies the benchmarks: as they should be, under other integrators, at other steps, with faults."""
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
-from multiprocessing import get_context
 
 import numpy as np
 
-from mjspace import mujoco_log
 from mjspace.provenance import software
-from mjspace.validation import benchmarks
+from mjspace.validation import benchmarks, workers
 from mjspace.validation.benchmark import (
     FAULTS,
     Benchmark,
@@ -71,17 +67,8 @@ def validate(
 
 def on_every_core(planned: Sequence[Flight]) -> Iterator[tuple[Flight, Readings]]:
     """Yield each flight when it is done, with its readings."""
-    workers = min(os.cpu_count() or 1, len(planned))
-    # A fresh process each, for callbacks are global and threads do not survive a fork.
-    fresh = get_context("spawn")
-    with ProcessPoolExecutor(workers, fresh, initializer=mujoco_log.silence) as pool:
-        futures = {pool.submit(b.fly, c): (b, c) for b, c in planned}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    for index, readings in workers.each([(b.fly, c) for b, c in planned]):
+        yield planned[index], readings
 
 
 def _nominal(benchmark: Benchmark, quick: bool) -> Conditions:
