@@ -30,7 +30,7 @@ def svg(section: Section) -> str:
         page = Figure(figsize=(10.0, 3.0))
         FigureCanvasSVG(page)
         # Laid out by hand, which takes a tenth of the time.
-        room = {"left": 0.075, "right": 0.99, "bottom": 0.16, "top": 0.97, "wspace": 0.22}
+        room = {"left": 0.075, "right": 0.98, "bottom": 0.16, "top": 0.97, "wspace": 0.22}
         motion, error = page.subplots(1, 2, width_ratios=[1.25, 1.0], gridspec_kw=room)
         _draw_motion(motion, section)
         _draw_errors(error, section)
@@ -51,6 +51,7 @@ def _draw_motion(axes: Any, section: Section) -> None:
             axes.plot(line.x[::every], line.y[::every], ".", color=color, ms=4.5, label=_key(line))
         else:
             axes.plot(line.x, line.y, color=color, label=_key(line))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:.6g}")
     axes.set_xlabel(section.x_label)
     axes.set_ylabel(section.y_label)
     axes.legend(fontsize=7, frameon=False, ncols=2, loc="best", handlelength=1.2)

@@ -80,7 +80,7 @@ def _quantities(results: Results, *, reasons: bool) -> Table:
 
 def _matrix(results: Results) -> Table:
     table = _table("caught faults", *FAULTS)
-    for section in results.sections:
+    for section in (section for section in results.sections if section.faults):
         marks = {injected.fault: injected for injected in section.faults}
         table.add_row(
             section.name,

@@ -9,6 +9,7 @@ import pytest
 
 from mjspace.validation import figures, report, table
 from mjspace.validation.benchmark import Bound
+from mjspace.validation.benchmarks import ALL
 from mjspace.validation.results import Injected, Line, Results, Row, Section
 
 TIME = [0.0, 1.0, 2.0]
@@ -103,6 +104,17 @@ def test_markdown_rows_have_as_many_cells_as_their_head(tmp_path: Path) -> None:
         assert len({row.count("|") for row in rows}) == 1
     assert (tmp_path / "validation" / "spin.svg").is_file()
     assert "](validation/spin.svg)" in "\n".join(lines)
+
+
+def test_the_page_in_docs_is_of_these_benchmarks() -> None:
+    docs = Path(__file__).parents[2] / "docs"
+    page = (docs / "validation.md").read_text()
+    for benchmark in ALL:
+        assert f"## {benchmark.title}\n" in page, "run make validation"
+        for bound in benchmark.bounds:
+            assert bound.reason.replace("|", "\\|") in page, "run make validation"
+    drawn = {path.stem for path in (docs / "validation").iterdir()}
+    assert drawn == {benchmark.name for benchmark in ALL} | {"basilisk"}
 
 
 def test_a_figure_is_the_same_every_time_and_well_formed() -> None:
