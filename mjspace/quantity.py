@@ -45,6 +45,18 @@ UNITS: dict[str, tuple[str, float]] = {
     "N m s": ("N m s", 1.0),
     "N m s/rad": ("N m s/rad", 1.0),
     "J": ("J", 1.0),
+    "V": ("V", 1.0),
+    "mV": ("V", 1e-3),
+    "A": ("A", 1.0),
+    "mA": ("A", 1e-3),
+    "ohm": ("ohm", 1.0),
+    "mohm": ("ohm", 1e-3),
+    "H": ("H", 1.0),
+    "mH": ("H", 1e-3),
+    "uH": ("H", 1e-6),
+    "N m/A": ("N m/A", 1.0),
+    "mN m/A": ("N m/A", 1e-3),
+    "V s/rad": ("N m/A", 1.0),
 }
 
 
