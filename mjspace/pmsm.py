@@ -41,9 +41,14 @@ class Drives:
     @classmethod
     def of(cls, tables: Sequence[Pmsm]) -> "Drives":
         """Return the motors of a scenario's tables, in their order."""
-        limits = [inf if t.voltage_limit is None else t.voltage_limit for t in tables]
-        columns = [(t.pole_pairs, t.resistance, t.inductance, t.torque_constant) for t in tables]
-        return cls(*np.array(columns, dtype=float).reshape(-1, 4).T.copy(), np.array(limits))
+        columns = [
+            (
+                *(t.pole_pairs, t.resistance, t.inductance, t.torque_constant),
+                inf if t.voltage_limit is None else t.voltage_limit,
+            )
+            for t in tables
+        ]
+        return cls(*np.array(columns).T.copy())
 
     def reset(self, batch: tuple[int, ...] = ()) -> Array:
         """Return no current in any motor [A], shape (*batch, m, 2)."""
