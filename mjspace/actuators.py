@@ -1,13 +1,44 @@
-"""Reaction-wheel motors: the wanted torque on the bus, shared among wheels that have limits."""
+"""Actuators: what a command makes the motors do; here the reaction wheels', which have limits."""
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numba
 import numpy as np
 
-from mjspace.contract import Array
+from mjspace.contract import Array, Measurement
+
+State = dict[str, Array]
+"""What actuators remember, vehicle axis first."""
+
+
+class Actuators(Protocol):
+    """The motors of a batch of vehicles: all memory in ``State``."""
+
+    logged_as: ClassVar[str]
+    """The field of /command that their torques are logged under."""
+    takes: ClassVar[str]
+    """What a command must have."""
+    acts_on: ClassVar[str]
+    """MuJoCo's array that ``act`` fills: "ctrl", or "qfrc_applied" for the bus's torque."""
+    stateful: ClassVar[bool]
+    """Whether they must act in every integration step; else once in a control period."""
+
+    def reset(self, vehicles: int) -> State:
+        """Return the state at the start."""
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, Array, Array]:
+        """Return (state, torque, saturated) for ``step`` [s] from now; arrays (N, m).
+
+        ``torque`` [N m] is on what each turns, ``saturated`` 1.0 for one that does not do as it is
+        told.
+        """
+
+    def seen(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth with what the motors themselves show."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +54,10 @@ class ReactionWheels:
     """Largest motor torque [N m]."""
     speed_limit: float = inf
     """Largest speed relative to the bus [rad/s]."""
+    logged_as: ClassVar[str] = "wheel_torque"
+    takes: ClassVar[str] = "torque of shape (..., 3) [N m]"
+    acts_on: ClassVar[str] = "ctrl"
+    stateful: ClassVar[bool] = False
     allocation: Array = field(init=False, repr=False)
     """Motor torques for each unit of torque on the bus, shape (n, 3): -pinv(axes^T)."""
     _limits: Array = field(init=False, repr=False)
@@ -30,6 +65,20 @@ class ReactionWheels:
     def __post_init__(self) -> None:
         object.__setattr__(self, "allocation", -np.linalg.pinv(self.axes.T))
         object.__setattr__(self, "_limits", np.array([self.torque_limit, self.speed_limit]))
+
+    def reset(self, vehicles: int) -> State:
+        """Return no state."""
+        return {}
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, Array, Array]:
+        """Return what ``motor_torque`` does for a ``TorqueCommand``."""
+        return state, *self.motor_torque(command.torque, truth.wheel_speed)
+
+    def seen(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth: the wheels show their speed alone."""
+        return truth
 
     def motor_torque(self, torque: Array, wheel_speed: Array) -> tuple[Array, Array]:
         """Return (ctrl, saturated), each of shape (..., n).
@@ -47,6 +96,31 @@ class ReactionWheels:
             torque, wheel_speed, self.allocation, self._limits
         )
         return given
+
+
+@dataclass(frozen=True)
+class IdealThrusters:
+    """Thrusters of which nothing is modelled but their torque, which is what the law asks for."""
+
+    logged_as: ClassVar[str] = "thruster_torque"
+    takes: ClassVar[str] = "torque of shape (..., 3) [N m]"
+    acts_on: ClassVar[str] = "qfrc_applied"
+    stateful: ClassVar[bool] = False
+
+    def reset(self, vehicles: int) -> State:
+        """Return no state."""
+        return {}
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, Array, Array]:
+        """Return the torque of a ``TorqueCommand``, body axes, (N, 3); nothing is ever cut."""
+        torque = np.asarray(command.torque, dtype=float).reshape(truth.rate.shape)
+        return state, torque, np.zeros((len(torque), 0))
+
+    def seen(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth: thrusters show nothing."""
+        return truth
 
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.

@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from mjspace import environment, plant
-from mjspace.actuators import ReactionWheels
+from mjspace.actuators import Actuators, IdealThrusters, ReactionWheels
 from mjspace.components import construct, load_object, source_of
 from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.errors import blamed_on
+from mjspace.motor_drives import MotorDrives
 from mjspace.one_by_one import OneByOne
 from mjspace.plant import Vehicle
 from mjspace.scenario import Component, Scenario
 from mjspace.sensors import SensorSuite
-from mjspace.tables import Wheels
+from mjspace.tables import PlantTable, Wheels
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Assembly:
     """At time zero, (nv,)."""
     userdata: Array
     """The environment's parameters, one row (nuserdata,)."""
-    wheels: ReactionWheels
+    actuators: Actuators
     reference: ReferenceSource
     law: Law
     disturbance: Callable[..., tuple[Any, Any]] | None
@@ -47,7 +48,7 @@ class Assembly:
             scenario.rates,
             scenario.seed,
             members,
-            wheels=len(self.vehicle.wheel_axes),
+            wheels=len(self.vehicle.wheel_dof),
         )
 
 
@@ -60,7 +61,8 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         InputError: a part cannot be built, with the scenario's key and what would be right.
     """
     friction = _friction(scenario.plant.wheels)
-    size = environment.userdata_size(scenario.environment, friction)
+    ripple = scenario.plant.ripple
+    size = environment.userdata_size(scenario.environment, friction, ripple)
     vehicle = _part("plant", partial(plant.build, userdata=size), scenario.plant, scenario.rates)
     facts = {
         "inertia": vehicle.inertia,
@@ -94,8 +96,9 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             vehicle.model,
             scenario.environment,
             friction,
+            ripple,
         ),
-        wheels=ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit),
+        actuators=_actuators(vehicle, scenario.plant),
         reference=reference,
         law=law if getattr(law, "batched", False) else OneByOne(law),
         disturbance=disturbance,
@@ -120,6 +123,14 @@ def _in_log(role: str, kind: str) -> str:
     """Return ``kind`` as the log knows it, where a file of one's own is attached as <role>.py."""
     place, _, name = kind.partition(":")
     return f"{role}.py:{name}" if place.endswith(".py") else kind
+
+
+def _actuators(vehicle: Vehicle, table: PlantTable) -> Actuators:
+    if table.drives:
+        return MotorDrives.of(vehicle, [table.drives[name] for name in vehicle.motors])
+    if table.ideal_thrusters:
+        return IdealThrusters()
+    return ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit)
 
 
 def _friction(wheels: Wheels) -> dict[str, float]:

@@ -20,7 +20,13 @@ class Measurement(NamedTuple):
     rate: Array
     """Angular velocity relative to inertial, body axes [rad/s], shape (..., 3)."""
     wheel_speed: Array
-    """Wheel speeds relative to the bus [rad/s], shape (..., n)."""
+    """Wheel speeds relative to what carries them [rad/s], shape (..., n)."""
+    gimbal_angle: Array = np.zeros(0)
+    """Gimbal angles, the outer before the inner [rad], shape (..., g)."""
+    gimbal_rate: Array = np.zeros(0)
+    """Gimbal rates relative to what carries them [rad/s], shape (..., g)."""
+    current: Array = np.zeros(0)
+    """(I_d, I_q) of each motor that has an electrical side [A], shape (..., m, 2)."""
 
 
 class Reference(NamedTuple):
@@ -41,6 +47,13 @@ class TorqueCommand(NamedTuple):
     """On the bus, body axes [N m], shape (..., 3)."""
 
 
+class VoltageCommand(NamedTuple):
+    """What an inner loop asks of the motors' inverters."""
+
+    voltage: Array
+    """(u_d, u_q) of each motor, in the rotor's axes [V], shape (..., m, 2)."""
+
+
 class Law(Protocol):
     """A control law: gains in, two pure functions, no hidden state.
 
@@ -48,7 +61,11 @@ class Law(Protocol):
     those of the measurement; they are logged under their field names, so their shapes never change
     during a flight. A law that says ``batched = True`` handles any leading axes; another sees the
     arrays of one vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any
-    command with that field.
+    command with that field; motors with an electrical side a ``VoltageCommand``.
+
+    A batched law may have an inner loop as well, for what must be quick: a method
+    ``inner(state, time, command, measurement) -> (state, command)``, pure like ``step``, that is
+    called every integration step and turns the command of ``step`` into that of the motors.
     """
 
     def reset(self, measurement: Measurement, reference: Reference) -> Any:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from mjspace import environment_kernel as kernel
 from mjspace import kepler, struct_offsets
 from mjspace.contract import Array
-from mjspace.tables import DisturbanceTorque, Environment, Orbit
+from mjspace.tables import DisturbanceTorque, Environment, Orbit, Ripple
 
 SENSOR = "environment"
 """Name of the user sensor (6 numbers, needstage "vel") that is given the environment's total on the
@@ -41,20 +41,27 @@ def _callbacks() -> tuple[Any, Any]:
     return kernel.passive_callback(*offsets), kernel.sensor_callback(*offsets)
 
 
-def userdata_size(environment: Environment, friction: Mapping[str, float]) -> int:
+def userdata_size(
+    environment: Environment, friction: Mapping[str, float], ripple: Mapping[str, Ripple] = {}
+) -> int:
     """Return the ``nuserdata`` that a model needs for ``userdata`` with the same arguments.
 
     Raises:
         ValueError: the orbit meets the planet.
     """
-    return kernel.HEADER + sum(block.size for block in _blocks(environment, friction, {}))
+    return kernel.HEADER + sum(block.size for block in _blocks(environment, friction, ripple, {}))
 
 
-def userdata(model: Any, environment: Environment, friction: Mapping[str, float]) -> Array:
+def userdata(
+    model: Any,
+    environment: Environment,
+    friction: Mapping[str, float],
+    ripple: Mapping[str, Ripple] = {},
+) -> Array:
     """Return a vehicle's ``userdata``, shape (model.nuserdata,).
 
-    ``friction`` is the Coulomb friction [N m] of hinges, by name. The bus is the body of the first
-    free joint.
+    ``friction`` is the Coulomb friction [N m] of hinges, ``ripple`` their motors' torque ripple, by
+    name. The bus is the body of the first free joint.
 
     Raises:
         ValueError: the model has no free joint, no such hinge, no passive forces, too little
@@ -69,12 +76,12 @@ def userdata(model: Any, environment: Environment, friction: Mapping[str, float]
             "the model disables springs and dampers both, and so, in MuJoCo, every passive force, "
             "the environment among them: enable one"
         )
-    needed = userdata_size(environment, friction)
+    needed = userdata_size(environment, friction, ripple)
     if model.nuserdata < needed:
         raise ValueError(f"the model's nuserdata is {model.nuserdata}: {needed} are needed")
-    dofs = {name: _hinge_dof(model, name) for name in friction}
+    hinges = {name: _hinge(model, name) for name in (*friction, *ripple)}
     header = np.array([kernel.MAGIC, model.nv, model.jnt_dofadr[free[0]], _sensor_address(model)])
-    packed = np.concatenate([header, *_blocks(environment, friction, dofs)])
+    packed = np.concatenate([header, *_blocks(environment, friction, ripple, hinges)])
     return np.pad(packed, (0, model.nuserdata - packed.size))
 
 
@@ -93,8 +100,12 @@ def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
 
 
 def _blocks(
-    environment: Environment, friction: Mapping[str, float], dofs: Mapping[str, int]
+    environment: Environment,
+    friction: Mapping[str, float],
+    ripple: Mapping[str, Ripple],
+    hinges: Mapping[str, tuple[int, int]],
 ) -> list[Array]:
+    """Return the terms' blocks; without ``hinges``, their (dof, place in qpos), of that size."""
     blocks = []
     if environment.orbit is not None:
         blocks.append(_block(kernel.ORBIT, kepler.pack(environment.orbit)))
@@ -102,8 +113,14 @@ def _blocks(
         kind = kernel.BODY_TORQUE if torque.frame == "body" else kernel.INERTIAL_TORQUE
         blocks.append(_block(kind, _pack_torque(torque)))
     if friction:
-        pairs = [(dofs.get(name, 0), coefficient) for name, coefficient in friction.items()]
+        pairs = [(hinges.get(name, (0, 0))[0], c) for name, c in friction.items()]
         blocks.append(_block(kernel.FRICTION, np.ravel(pairs)))
+    if ripple:
+        rows = [
+            (*hinges.get(name, (0, 0)), r.amplitude, r.cycles, r.phase)
+            for name, r in ripple.items()
+        ]
+        blocks.append(_block(kernel.RIPPLE, np.ravel(rows)))
     return blocks
 
 
@@ -119,11 +136,12 @@ def _pack_torque(torque: DisturbanceTorque) -> Array:
     return np.concatenate(series)
 
 
-def _hinge_dof(model: Any, name: str) -> int:
+def _hinge(model: Any, name: str) -> tuple[int, int]:
+    """Return the hinge's dof and its place in ``qpos``."""
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
     if joint < 0 or model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
-        raise ValueError(f"friction: no hinge {name!r} in the model")
-    return int(model.jnt_dofadr[joint])
+        raise ValueError(f"friction or ripple: no hinge {name!r} in the model")
+    return int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint])
 
 
 def _sensor_address(model: Any) -> int:

@@ -19,15 +19,13 @@ from numba import cfunc, njit, types
 from numba.np.numpy_support import carray
 
 from mjspace import kepler
+from mjspace.environment_torques import body_torque, friction, inertial_torque, ripple
 from mjspace.native_memory import floats, ints
 from mjspace.struct_offsets import DataOffsets, ModelOffsets
 
 MAGIC = 6.02214076e23
 HEADER = 4
-ORBIT, BODY_TORQUE, INERTIAL_TORQUE, FRICTION = 1.0, 2.0, 3.0, 4.0
-
-FRICTION_SPEED = 0.1
-"""Speed [rad/s] over which Coulomb friction is smoothed through zero."""
+ORBIT, BODY_TORQUE, INERTIAL_TORQUE, FRICTION, RIPPLE = 1.0, 2.0, 3.0, 4.0, 5.0
 
 _STAGE_VELOCITY = 2  # mjSTAGE_VEL: passive forces are known from it on
 
@@ -46,6 +44,7 @@ class Vehicle(NamedTuple):
     body_mass: Any
     body_inertia: Any
     dof_parentid: Any
+    qpos: Any
     qvel: Any
     xipos: Any
     ximat: Any
@@ -69,6 +68,8 @@ def add_forces(userdata: Any, time: float, vehicle: Vehicle) -> None:
             inertial_torque(payload, time, vehicle)
         elif kind == FRICTION:
             friction(payload, vehicle)
+        elif kind == RIPPLE:
+            ripple(payload, vehicle)
         block = end
 
 
@@ -134,47 +135,6 @@ def add_wrench(vehicle: Vehicle, body: int, force: Any, torque: Any) -> None:
         dof = vehicle.dof_parentid[dof]
 
 
-@njit(cache=True, error_model="numpy")
-def torque_at(series: Any, time: float) -> tuple[float, float, float]:
-    """Return a bias and a sum of sinusoids [N m] at ``time`` [s].
-
-    ``series``: the bias (3), then for each sinusoid its frequency [rad/s], the factors of its sine
-    (3) and of its cosine (3).
-    """
-    x, y, z = series[0], series[1], series[2]
-    for i in range(3, series.size, 7):
-        sine, cosine = math.sin(series[i] * time), math.cos(series[i] * time)
-        x += series[i + 1] * sine + series[i + 4] * cosine
-        y += series[i + 2] * sine + series[i + 5] * cosine
-        z += series[i + 3] * sine + series[i + 6] * cosine
-    return x, y, z
-
-
-@njit(cache=True, error_model="numpy")
-def body_torque(series: Any, time: float, vehicle: Vehicle) -> None:
-    """Add a torque on the bus whose components are in body axes."""
-    torque = torque_at(series, time)
-    for i in range(3):
-        vehicle.qfrc_passive[vehicle.bus_dof + 3 + i] += torque[i]
-
-
-@njit(cache=True, error_model="numpy")
-def inertial_torque(series: Any, time: float, vehicle: Vehicle) -> None:
-    """Add a torque on the bus whose components are in inertial axes."""
-    torque = torque_at(series, time)
-    for dof in range(vehicle.bus_dof + 3, vehicle.bus_dof + 6):
-        s = vehicle.cdof[dof]  # a body axis, in world axes
-        vehicle.qfrc_passive[dof] += s[0] * torque[0] + s[1] * torque[1] + s[2] * torque[2]
-
-
-@njit(cache=True, error_model="numpy")
-def friction(pairs: Any, vehicle: Vehicle) -> None:
-    """Add -c tanh(speed / FRICTION_SPEED) [N m] to hinges, given as dof, c, dof, c..."""
-    for i in range(0, pairs.size, 2):
-        dof = int(pairs[i])
-        vehicle.qfrc_passive[dof] -= pairs[i + 1] * math.tanh(vehicle.qvel[dof] / FRICTION_SPEED)
-
-
 def passive_callback(model_at: ModelOffsets, data_at: DataOffsets) -> Any:
     """Return the native ``mjcb_passive`` for structs with these offsets.
 
@@ -200,6 +160,7 @@ def passive_callback(model_at: ModelOffsets, data_at: DataOffsets) -> Any:
             floats(m, model_at.body_mass, (nbody,)),
             floats(m, model_at.body_inertia, (nbody, 3)),
             ints(m, model_at.dof_parentid, nv),
+            floats(d, data_at.qpos, (m[model_at.nq],)),
             floats(d, data_at.qvel, (nv,)),
             floats(d, data_at.xipos, (nbody, 3)),
             floats(d, data_at.ximat, (nbody, 9)),

@@ -16,8 +16,10 @@ import numpy as np
 from dm_env.specs import BoundedArray
 
 from mjspace import attitude, dm_bridge, environment, loading
+from mjspace.actuators import ReactionWheels
 from mjspace.assembly import Assembly, assemble
 from mjspace.contract import Array, Measurement, Reference
+from mjspace.errors import InputError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.simulation import BLOCK_PERIODS, INTEGRATION, first_start, last_period
 from mjspace.tape import Columns
@@ -136,7 +138,11 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
 
     def __init__(self, assembly: Assembly) -> None:
         scenario = assembly.scenario
-        self._wheels, self._inertia = assembly.wheels, assembly.vehicle.inertia
+        if not isinstance(assembly.actuators, ReactionWheels):
+            raise InputError(
+                "plant.drives: an environment's action is a torque for reaction wheels"
+            )
+        self._wheels, self._inertia = assembly.actuators, assembly.vehicle.inertia
         self._control, self._last = scenario.rates.control, last_period(scenario)
         self._bounds = [
             (check.start, math.inf if check.end is None else check.end, check.below)
@@ -185,7 +191,8 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
             **physics.measurement()._asdict(),
             **{f"reference_{k}": v for k, v in self._reference(physics)._asdict().items()},
         }
-        return OrderedDict((name, np.array(values)) for name, values in named.items())
+        # What the vehicle has no sensor for is empty.
+        return OrderedDict((name, np.array(v)) for name, v in named.items() if v.size)
 
     def get_reward(self, physics: Physics) -> float:
         """Return bound / (true attitude error), at most 1; 0 where the state is not finite.

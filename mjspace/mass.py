@@ -25,7 +25,7 @@ class Inertial(NamedTuple):
 
 def unit_axes(wheels: Wheels) -> Array:
     """Return the spin axes as unit vectors, body axes, shape (n, 3)."""
-    axes = np.array(wheels.axes)
+    axes = np.reshape(np.array(wheels.axes, dtype=float), (-1, 3))
     result: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     return result
 

@@ -6,7 +6,9 @@ velocity in BODY axes. The body origin is the vehicle's centre of mass, but for 
 """
 
 import gzip
+import re
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,8 +28,7 @@ class UnphysicalInertiaWarning(UserWarning):
 class Vehicle:
     """A compiled vehicle and what a law, an actuator and the log need to know of it."""
 
-    model: Any
-    """The ``mujoco.MjModel``."""
+    model: Any  # the ``mujoco.MjModel``
     inertia: Array
     """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia,
     body axes [kg m^2], shape (3, 3); wheel imbalance left out."""
@@ -36,7 +37,15 @@ class Vehicle:
     wheel_inertia: Array
     """Axial inertia of each rotor [kg m^2], shape (n,)."""
     wheel_dof: Any
-    """Index of each wheel's speed in ``qvel``, shape (n,)."""
+    """Index of each wheel's speed in ``qvel``, shape (n,): reaction wheels, then driven ones."""
+    gimbal_dof: Any
+    """Index of each driven gimbal's rate in ``qvel``, shape (g,)."""
+    gimbal_qpos: Any
+    """Index of each driven gimbal's angle in ``qpos``, shape (g,)."""
+    drive_dof: Any
+    """Index of each driven hinge's rate in ``qvel``, in the order of its motors, shape (m,)."""
+    motors: tuple[str, ...]
+    """Names of the hinges that motors turn, in the order of ``ctrl``."""
     torque_limit: float
     """Largest motor torque [N m]; inf where there is none."""
     speed_limit: float
@@ -78,7 +87,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
         wheel_inertia=_frozen(np.full(len(axes), wheels.inertia)),
         torque_limit=wheels.torque_limit or np.inf,
         speed_limit=wheels.speed_limit or np.inf,
-        **_addresses(model, len(axes)),
+        **_addresses(model, len(axes), table.drives),
     )
 
 
@@ -88,7 +97,9 @@ def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
     Raises:
         KeyError: ``model`` lacks one of the vehicle's joints or sensors.
     """
-    return replace(vehicle, model=model, **_addresses(model, len(vehicle.wheel_axes)))
+    reaction_wheels = len(vehicle.wheel_axes)
+    driven = vehicle.motors[reaction_wheels:]
+    return replace(vehicle, model=model, **_addresses(model, reaction_wheels, driven))
 
 
 def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
@@ -98,8 +109,8 @@ def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
     they hold for wheels anywhere in the bus; where more than three wheels can make it, the least.
 
     Raises:
-        ValueError: not one speed for each wheel, a speed above the limit, or a momentum that the
-            wheels' axes cannot make.
+        ValueError: not one speed for each wheel, a speed above the limit, a joint that is not
+            there, or a momentum that the wheels' axes cannot make.
 
     Warns:
         guards.ModelWarning: a step too long for imbalanced wheels at the speed limit or, where
@@ -122,20 +133,30 @@ def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
                 f"initial.wheel_speed: {len(initial.wheel_speed)} speeds for {len(wheels)} wheels"
             )
         data.qvel[wheels] = initial.wheel_speed
-    fastest = np.abs(data.qvel[wheels]).max()
-    if fastest > vehicle.speed_limit:
+    _set_joints(vehicle.model, data, initial)
+    fastest, limit = np.abs(data.qvel[wheels]).max(initial=0.0), vehicle.speed_limit
+    if fastest > limit:
         raise ValueError(
             f"initial: a wheel starts at {fastest:.6g} rad/s, above plant.wheels.speed_limit "
-            f"{vehicle.speed_limit:g} rad/s: start slower or raise the limit"
+            f"{limit:g} rad/s: start slower or raise the limit"
         )
-    guards.check_imbalance(
-        vehicle.model, vehicle.speed_limit if np.isfinite(vehicle.speed_limit) else fastest
-    )
+    guards.check_imbalance(vehicle.model, limit if np.isfinite(limit) else fastest)
     return data.qpos.copy(), data.qvel.copy()
 
 
+def _set_joints(model: Any, data: Any, initial: Initial) -> None:
+    known = {model.joint(i).name: i for i in range(1, model.njnt)}  # the free joint is the first
+    for name in (*initial.joint_position, *initial.joint_speed):
+        if name not in known:
+            raise ValueError(f"initial: no joint {name!r} among the parts: have {', '.join(known)}")
+    for name, value in initial.joint_position.items():
+        data.qpos[model.jnt_qposadr[known[name]]] = value
+    for name, value in initial.joint_speed.items():
+        data.qvel[model.jnt_dofadr[known[name]]] = value
+
+
 def to_bytes(model: Any) -> bytes:
-    """Return the compiled model as a gzipped MJB file: equal models give equal bytes."""
+    """Return the compiled model as gzipped MJB: equal models give equal bytes."""
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
     return gzip.compress(buffer.tobytes(), compresslevel=3, mtime=0)
@@ -185,12 +206,38 @@ def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
     return speeds
 
 
-def _addresses(model: Any, wheels: int) -> dict[str, Any]:
-    joints = [model.joint(f"wheel_{index}") for index in range(wheels)]
+def _addresses(model: Any, wheels: int, driven: Iterable[str]) -> dict[str, Any]:
+    """Return where things are in a model of that many reaction wheels, and of ``driven`` hinges."""
+    reaction_wheels = [f"wheel_{index}" for index in range(wheels)]
+    drives = _by_motor(model, driven)
+    gimbals = [name for name in drives if not name.endswith("wheel")]
+    spun = [*reaction_wheels, *(name for name in drives if name not in gimbals)]
     return {
-        "wheel_dof": _frozen(np.array([joint.dofadr[0] for joint in joints])),
+        "wheel_dof": _where(model.joint(name).dofadr for name in spun),
+        "gimbal_dof": _where(model.joint(name).dofadr for name in gimbals),
+        "gimbal_qpos": _where(model.joint(name).qposadr for name in gimbals),
+        "drive_dof": _where(model.joint(name).dofadr for name in drives),
+        "motors": (*reaction_wheels, *drives),
         **{name: _sensor(model, name) for name in ("momentum", "kinetic", "environment")},
     }
+
+
+def _by_motor(model: Any, driven: Iterable[str]) -> list[str]:
+    """Return the ``driven`` hinges in the order of their motors in ``ctrl``.
+
+    Raises:
+        ValueError: no motor turns one of them, or a motor is left without its drive.
+    """
+    turned = [model.joint(model.actuator_trnid[i, 0]).name for i in range(model.nu)]
+    parts = [name for name in turned if not re.fullmatch(r"wheel_\d+", name)]
+    for name in driven:
+        if name not in parts:
+            raise ValueError(f"plant.drives.{name}: no motor turns it: have {', '.join(parts)}")
+    return [name for name in parts if name in set(driven)]
+
+
+def _where(addresses: Iterable[Any]) -> Any:
+    return _frozen(np.array([address[0] for address in addresses], dtype=int))
 
 
 def _sensor(model: Any, name: str) -> slice:

@@ -114,7 +114,8 @@ def _advance(
             constants[0, n], constants[1, n], constants[2, n], constants[3, n], constants[4, n]
         )  # fmt: skip
         length = np.hypot(voltage[n, 0], voltage[n, 1])
-        share = limit / length if length > limit else 1.0
+        beyond = length > limit
+        share = (limit if beyond else 1.0) / (length if beyond else 1.0)  # never by zero
         applied[n, 0], applied[n, 1] = share * voltage[n, 0], share * voltage[n, 1]
 
         a = complex(-R / L, -p * speed[n])

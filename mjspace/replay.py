@@ -137,12 +137,15 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     if len(row["time"]) != 1:
         raise InputError(f"t = {time:g} s is not in the log: it has {log.start:g} to {log.end:g} s")
     state = {name: values for name, values in row.items() if name != "time"}
-    sensors = {n.removeprefix("sensor_"): v for n, v in state.items() if n.startswith("sensor_")}
+    sensors, actuators = (
+        {name.removeprefix(kind): v for name, v in state.items() if name.startswith(kind)}
+        for kind in ("sensor_", "actuator_")
+    )
     law_state: Any = None
     if not fresh_law:
         seen, wanted = log.read("/measurement", None, *near), log.read("/reference", None, *near)
         template = assembly.law.reset(
-            Measurement(*(seen[name] for name in Measurement._fields)),
+            Measurement(**{n: seen.get(n, np.zeros((1, 0))) for n in Measurement._fields}),
             Reference(*(wanted[name][0] for name in Reference._fields)),
         )
         names = getattr(template, "_fields", ())
@@ -150,7 +153,7 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
         if missing:
             raise InputError(f"the log has no state {missing[0]!r} for this law: another flew")
         law_state = type(template)(*(state[f"law_{name}"] for name in names)) if names else ()
-    return Start(number, state["physics"], sensors, law_state)
+    return Start(number, state["physics"], sensors, law_state, actuators)
 
 
 def _first_difference(logged: dict[str, Any], flown: dict[str, Any]) -> Difference | None:

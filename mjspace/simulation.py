@@ -3,7 +3,7 @@
 import math
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
@@ -16,7 +16,7 @@ from mjspace.contract import Array, Measurement, Reference
 from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.scenario import Scenario
-from mjspace.tape import Block, Columns, Tape
+from mjspace.tape import Block, Columns, Tape, until_trouble
 
 BLOCK_PERIODS = 500
 BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
@@ -35,6 +35,8 @@ class Start:
     """The sensors' state before they sample in this period."""
     law: Any
     """The law's state before it steps in this period; None: the law is reset here."""
+    actuators: dict[str, Array] = field(default_factory=dict)
+    """The actuators' state at the period's start."""
 
 
 def last_period(scenario: Scenario) -> int:
@@ -51,8 +53,9 @@ def first_start(assembly: Assembly, members: Sequence[int]) -> Start:
     row = np.empty(mujoco.mj_stateSize(model, INTEGRATION))
     mujoco.mj_getState(model, data, row, INTEGRATION)
     physics = np.repeat(row[None], len(members), axis=0)
-    sensors = assembly.sensors(members).reset(Columns(assembly).truth(physics))
-    return Start(0, physics, sensors, None)
+    actuators = assembly.actuators.reset(len(members))
+    truth = assembly.actuators.seen(actuators, Columns(assembly).truth(physics))
+    return Start(0, physics, assembly.sensors(members).reset(truth), None, actuators)
 
 
 def fly(
@@ -73,13 +76,13 @@ def fly(
     """
     flight = _Flight(assembly, start, members, threads)
     last = last_period(assembly.scenario)
-    saturated = np.zeros((len(members), len(assembly.vehicle.wheel_axes)), dtype=bool)
+    saturated = np.zeros((len(members), len(assembly.vehicle.motors)), dtype=bool)
     period = start.period
     while period <= last:
         tape, trouble = flight.record(period, last, stop)
         if not len(tape):
             raise FlightError(trouble)
-        block, problem = _until_trouble(
+        block, problem = until_trouble(
             tape.block(assembly, flight.columns, saturated), flight.columns
         )
         if len(block.time):
@@ -107,13 +110,18 @@ class _Flight:
         self.sensors, self.law_state = start.sensors, start.law
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
         self.batch.state[:] = start.physics
-        self.ctrl = self.batch.bind("ctrl")[:, : len(assembly.vehicle.wheel_axes)]
+        self.applied = self._applied(assembly.actuators.acts_on)
         self.sensordata = self.batch.bind("sensordata")
+        self.actuators, self.actuator_state = assembly.actuators, start.actuators
+        self.inner = getattr(assembly.law, "inner", None)
         self.push = None
         if assembly.disturbance is not None:
             bus = assembly.vehicle.model.body("bus").id
             applied = self.batch.bind("xfrc_applied")[:, bus]
             self.push = HeldDisturbance(assembly.disturbance, applied)
+        self.quick = self.inner is not None or self.actuators.stateful
+        self.stepwise = self.quick or self.push is not None
+        self.hold = scenario.rates.physics if self.quick else scenario.rates.control
         self.steps = scenario.rates.steps
         self.tick = math.gcd(self.steps, *self.suite.ticks)
         recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
@@ -147,13 +155,14 @@ class _Flight:
         self, tape: Tape, period: int, now: float, reference: Reference, *, flown: bool
     ) -> None:
         physics = self.batch.state.copy()
-        truth = self.columns.truth(physics)
+        truth = self._truth(physics)
         tape.physics.append(physics)
         tape.sensors.append(self.sensors)
+        tape.actuators.append(self.actuator_state)
+        tape.truth.append(truth)
         self.sensors, measurement = self.suite.sample(self.sensors, period * self.steps, truth)
         before, command, signals = self._ask_law(now, measurement, reference)
-        motor, saturated = self._drive(command, truth)
-        self.ctrl[:] = motor
+        motor, saturated = self._drive(now, command, measurement, truth)
         if self.push is not None:
             tape.push.append(self.push(now, truth))
         # Derived fields lag the state by one substep: the first substep computes those of `now`.
@@ -164,12 +173,12 @@ class _Flight:
         tape.law.append(before)
         tape.measurement.append(measurement)
         tape.command.append(command)
-        tape.wheel_torque.append(motor)
+        tape.motor_torque.append(motor)
         tape.saturated.append(saturated)
         tape.signals.append(signals)
         tape.sensordata.append(self.sensordata.copy())
         if flown and self.steps > 1:
-            self._rest_of_period(period * self.steps)
+            self._rest_of_period(period * self.steps, command)
 
     def _ask_law(
         self, now: float, measurement: Measurement, reference: Reference
@@ -185,50 +194,52 @@ class _Flight:
             raise FlightError(f"the law raised {type(error).__name__}: {error}") from error
         return before, command, signals
 
-    def _drive(self, command: Any, truth: Measurement) -> tuple[Array, Array]:
-        """Return the wheels' motor torques, and which of them are cut."""
+    def _drive(
+        self, now: float, command: Any, measurement: Measurement, truth: Measurement
+    ) -> tuple[Array, Array]:
+        """Let the motors act on the command; return their torques, and which of them are cut."""
+        if self.inner is not None:
+            try:
+                self.law_state, command = self.inner(self.law_state, now, command, measurement)
+            except Exception as error:
+                raise FlightError(
+                    f"the law's inner loop raised {type(error).__name__}: {error}"
+                ) from error
         try:
-            return self.assembly.wheels.motor_torque(command.torque, truth.wheel_speed)
+            self.actuator_state, motor, saturated = self.actuators.act(
+                self.actuator_state, command, truth, self.hold
+            )
         except Exception as error:
             raise FlightError(
-                f"the law's command has no torque of shape (..., 3) [N m]: {error}"
+                f"the law's command has no {self.actuators.takes}: {error}"
             ) from error
+        self.applied[:] = motor
+        return motor, saturated
 
-    def _rest_of_period(self, first_step: int) -> None:
+    def _applied(self, array: str) -> Array:
+        """Return the view of MuJoCo's input that the actuators fill."""
+        vehicle = self.assembly.vehicle
+        bus_turn = slice(3, 6)  # the free joint comes first, its torque in body axes
+        view: Array = self.batch.bind(array)
+        return view[:, bus_turn if array == "qfrc_applied" else slice(len(vehicle.motors))]
+
+    def _truth(self, physics: Array) -> Measurement:
+        return self.actuators.seen(self.actuator_state, self.columns.truth(physics))
+
+    def _rest_of_period(self, first_step: int, command: Any) -> None:
         """Integrate from the period's first substep to its end, with the samples due in between."""
         step, physics_step = 1, self.assembly.scenario.rates.physics
         while step < self.steps:
-            due = step % self.tick == 0
-            if due or self.push is not None:
-                truth = self.columns.truth(self.batch.state.copy())
-                if due:
-                    self.sensors, _ = self.suite.sample(self.sensors, first_step + step, truth)
+            if self.stepwise or step % self.tick == 0:
+                now, truth = (
+                    (first_step + step) * physics_step,
+                    self._truth(self.batch.state.copy()),
+                )
+                self.sensors, seen = self.suite.sample(self.sensors, first_step + step, truth)
                 if self.push is not None:
-                    self.push((first_step + step) * physics_step, truth)
-            count = 1 if self.push is not None else self.tick - step % self.tick
+                    self.push(now, truth)
+                if self.quick:
+                    self._drive(now, command, seen, truth)
+            count = 1 if self.stepwise else self.tick - step % self.tick
             self.batch.step(nstep=count)
             step += count
-
-
-def _until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:
-    """Return the block up to the first value that cannot be flown, and which it is ('' if none).
-
-    A law may well signal infinity; what must be good is the motion and what acts on it.
-    """
-    acting = {
-        "/state.physics": block.rows["/state"]["physics"][..., columns.motion],
-        **{f"/measurement.{name}": a for name, a in block.rows["/measurement"].items()},
-        **{f"/command.{name}": a for name, a in block.rows["/command"].items()},
-    }
-    first, culprit = len(block.time), ""
-    for name, values in acting.items():
-        # Also false for what is not a number.
-        good = (np.abs(values) < mujoco.mjMAXVAL).reshape(len(values), -1).all(axis=1)
-        if not good.all() and int(np.argmin(good)) < first:
-            first, culprit = int(np.argmin(good)), name
-    if not culprit:
-        return block, ""
-    problem = f"{culprit} is not finite, or beyond 1e10, at t = {block.time[first]:.6g} s"
-    rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
-    events = [event for event in block.events if event[0] < block.time[first]]
-    return Block(block.period, block.time[:first], rows, events), problem

@@ -50,6 +50,7 @@ _PROBE = """
 class ModelOffsets(NamedTuple):
     """Offsets [words] of fields of mjModel; a field of ``opt`` has that prefix."""
 
+    nq: int
     nv: int
     nbody: int
     nuserdata: int
@@ -67,6 +68,7 @@ class DataOffsets(NamedTuple):
     """Offsets [words] of fields of mjData."""
 
     time: int
+    qpos: int
     qvel: int
     userdata: int
     xipos: int

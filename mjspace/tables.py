@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from mjspace.drive_tables import Pmsm
 from mjspace.fields import (
     Angle,
     Angles3,
@@ -46,8 +47,8 @@ class Rates(Table):
 class Wheels(Table):
     """Reaction wheels: one for each axis; every wheel is alike."""
 
-    axes: Annotated[list[Unit3], Field(min_length=1)] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    """Spin axes in body axes, one row for each wheel; normalized."""
+    axes: list[Unit3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    """Spin axes in body axes, one row for each wheel; normalized. None: ``[]``."""
     positions: list[Meters3] | None = None
     """Rotor centres in the body [m]; the centre of mass when left out."""
     inertia: Annotated[Positive, Si("kg m^2")] = 0.05
@@ -80,6 +81,17 @@ class Wheels(Table):
         return self
 
 
+class Ripple(Table):
+    """A motor's torque ripple: amplitude cos(cycles angle + phase) on its hinge, with reaction."""
+
+    amplitude: Annotated[NonNegative, Si("N m")]
+    """Largest torque."""
+    cycles: NonNegative
+    """In a turn of the hinge; a fraction makes a ripple slower than the turn."""
+    phase: Angle = 0.0
+    """At angle zero."""
+
+
 class Part(Table):
     """Something bolted to the bus that moves of itself: a nutation damper, a boom, a yo-yo."""
 
@@ -108,6 +120,21 @@ class PlantTable(Table):
     parts: dict[Name, Part] = {}
     """By a name of one's own: ``[plant.parts.damper]``. They add to the bus's mass and inertia, and
     to neither ``gyrostat_inertia`` nor the ``inertia`` that a law is given."""
+    drives: dict[Name, Pmsm] = {}
+    """Electric motors that turn hinges of the parts, by the hinge: ``[plant.drives.cmg_outer]``. A
+    hinge whose name ends in ``wheel`` is a wheel, any other a gimbal."""
+    ripple: dict[Name, Ripple] = {}
+    """Torque ripple of motors, by the hinge."""
+    ideal_thrusters: bool = False
+    """Whether the law's torque acts on the bus as if by thrusters, as it is; no wheels then."""
+
+    @model_validator(mode="after")
+    def _one_kind_of_motor(self) -> "PlantTable":
+        if (self.drives or self.ideal_thrusters) and self.wheels.axes:
+            raise ValueError("one kind of motor: set wheels.axes = [] to fly without wheels")
+        if self.drives and self.ideal_thrusters:
+            raise ValueError("drives and ideal_thrusters are both given: give one")
+        return self
 
     @model_validator(mode="after")
     def _one_inertia(self) -> "PlantTable":
@@ -140,6 +167,10 @@ class Initial(Table):
     """Of the bus, inertial axes."""
     wheel_speed: Annotated[list[Finite], Si("rad/s")] | None = None
     """Wheel speeds relative to the bus; zero when left out."""
+    joint_position: dict[Name, Finite] = {}
+    """Positions of the parts' joints, by name [rad or m]; the model's own when left out."""
+    joint_speed: dict[Name, Finite] = {}
+    """Speeds of the parts' joints, by name [rad/s or m/s]."""
     momentum: Momentum3 | None = None
     """Or the wanted total angular momentum about the centre of mass, inertial axes: the wheel
     speeds follow (the smallest, where more than three wheels can make it)."""

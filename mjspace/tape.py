@@ -1,5 +1,6 @@
 """What a flight records: a list entry for each control period, turned into rows block by block."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -49,15 +50,45 @@ class Columns:
         self.attitude = slice(before_qpos + 3, before_qpos + 7)
         self.velocity = slice(before_qvel, before_qvel + 3)
         self.rate = slice(before_qvel + 3, before_qvel + 6)
-        self.wheel_speed = slice(
-            before_qvel + 6, before_qvel + 6 + len(assembly.vehicle.wheel_axes)
-        )
+        vehicle = assembly.vehicle
+        self.wheel_speed = _columns(before_qvel + vehicle.wheel_dof)
+        self.gimbal_angle = _columns(before_qpos + vehicle.gimbal_qpos)
+        self.gimbal_rate = _columns(before_qvel + vehicle.gimbal_dof)
 
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors see, as views of the state rows."""
         return Measurement(
-            physics[..., self.attitude], physics[..., self.rate], physics[..., self.wheel_speed]
+            physics[..., self.attitude],
+            physics[..., self.rate],
+            physics[..., self.wheel_speed],
+            physics[..., self.gimbal_angle],
+            physics[..., self.gimbal_rate],
+            physics[..., :0],
         )
+
+
+def until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:
+    """Return the block up to the first value that cannot be flown, and which it is ('' if none).
+
+    A law may well signal infinity; what must be good is the motion and what acts on it.
+    """
+    acting = {
+        "/state.physics": block.rows["/state"]["physics"][..., columns.motion],
+        **{f"/measurement.{name}": a for name, a in block.rows["/measurement"].items()},
+        **{f"/command.{name}": a for name, a in block.rows["/command"].items()},
+    }
+    first, culprit = len(block.time), ""
+    for name, values in acting.items():
+        # Also false for what is not a number.
+        good = (np.abs(values) < mujoco.mjMAXVAL).reshape(len(values), -1).all(axis=1)
+        if not good.all() and int(np.argmin(good)) < first:
+            first, culprit = int(np.argmin(good)), name
+    if not culprit:
+        return block, ""
+    problem = f"{culprit} is not finite, or beyond 1e10, at t = {block.time[first]:.6g} s"
+    rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
+    events = [event for event in block.events if event[0] < block.time[first]]
+    return Block(block.period, block.time[:first], rows, events), problem
 
 
 @dataclass
@@ -68,11 +99,13 @@ class Tape:
     reference: Reference
     """Arrays of at least as many rows as will be recorded, without a vehicle axis."""
     physics: list[Array] = field(default_factory=list)
+    truth: list[Measurement] = field(default_factory=list)
+    actuators: list[dict[str, Array]] = field(default_factory=list)
     sensors: list[dict[str, Array]] = field(default_factory=list)
     law: list[Any] = field(default_factory=list)
     measurement: list[Measurement] = field(default_factory=list)
     command: list[Any] = field(default_factory=list)
-    wheel_torque: list[Array] = field(default_factory=list)
+    motor_torque: list[Array] = field(default_factory=list)
     saturated: list[Array] = field(default_factory=list)
     signals: list[Any] = field(default_factory=list)
     push: list[Array] = field(default_factory=list)
@@ -88,8 +121,12 @@ class Tape:
         physics = np.array(self.physics[:n])
         data = np.array(self.sensordata)
         reference = {name: a[:n, None] for name, a in self.reference._asdict().items()}
-        truth = columns.truth(physics)
+        truth = _fields(self.truth[:n])
         state = {"physics": physics}
+        state |= {
+            f"actuator_{name}": np.array([s[name] for s in self.actuators[:n]])
+            for name in self.actuators[0]
+        }
         state |= {f"law_{name}": a for name, a in _fields(self.law[:n]).items()}
         state |= {
             f"sensor_{name}": np.array([s[name] for s in self.sensors[:n]])
@@ -101,12 +138,12 @@ class Tape:
         rows: Rows = {
             "/state": state,
             "/truth": {
-                **truth._asdict(),
+                **truth,
                 "position": physics[..., columns.position],
                 "velocity": physics[..., columns.velocity],
                 "momentum": data[..., vehicle.momentum],
                 "energy": data[..., vehicle.kinetic],
-                "attitude_error": attitude.rotation_angle(truth.attitude, reference["attitude"])[
+                "attitude_error": attitude.rotation_angle(truth["attitude"], reference["attitude"])[
                     ..., None
                 ],
             },
@@ -117,18 +154,27 @@ class Tape:
             },
             "/command": {
                 **_fields(self.command[:n]),
-                "wheel_torque": np.array(self.wheel_torque[:n]),
+                assembly.actuators.logged_as: np.array(self.motor_torque[:n]),
             },
             "/law": _fields(self.signals[:n]),
             "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
         }
         time = (self.period + np.arange(n, dtype=float)) * assembly.scenario.rates.control
-        events = _saturation_events(time, np.array(self.saturated[:n], bool), saturated_before)
+        events = _saturation_events(
+            time, np.array(self.saturated[:n], bool), saturated_before, vehicle.motors
+        )
         return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
 
 
+def _columns(indices: Any) -> Any:
+    """Return consecutive indices as a slice, which views where a list of them would copy."""
+    if np.all(np.diff(indices) == 1):
+        return slice(indices[0], indices[-1] + 1) if len(indices) else slice(0, 0)
+    return indices
+
+
 def _fields(tuples: list[Any]) -> dict[str, Array]:
-    """Return the named tuples' fields as arrays with a period axis.
+    """Return the named tuples' fields as arrays with a period axis; without what is empty.
 
     Raises:
         FlightError: no named tuples of arrays, or arrays that change their shape.
@@ -138,19 +184,20 @@ def _fields(tuples: list[Any]) -> dict[str, Array]:
     try:
         names = tuples[0]._fields
         columns = zip(*tuples, strict=True)
-        return {n: np.array(column, float) for n, column in zip(names, columns, strict=True)}
+        fields = {n: np.array(column, float) for n, column in zip(names, columns, strict=True)}
     except (AttributeError, TypeError, ValueError) as error:
         raise FlightError(
             f"a law's state, command and signals are named tuples of arrays of constant shape; "
             f"{type(tuples[0]).__name__} is not: {error}"
         ) from error
+    return {name: array for name, array in fields.items() if array.size}
 
 
 def _saturation_events(
-    time: Array, saturated: Array, before: Array
+    time: Array, saturated: Array, before: Array, motors: Sequence[str]
 ) -> list[tuple[float, int, str]]:
     rising = saturated & ~np.concatenate([before[None], saturated[:-1]])
     return [
-        (float(time[k]), int(vehicle), f"wheel_{wheel} saturated")
-        for k, vehicle, wheel in np.argwhere(rising)
+        (float(time[k]), int(vehicle), f"{motors[motor]} saturated")
+        for k, vehicle, motor in np.argwhere(rising)
     ]

@@ -1,0 +1,66 @@
+"""Torques among the environment's terms, on the bus and on hinges; compiled.
+
+``vehicle`` is ``environment_kernel.Vehicle`` throughout.
+"""
+
+import math
+from typing import Any
+
+from numba import njit
+
+FRICTION_SPEED = 0.1
+"""Speed [rad/s] over which Coulomb friction is smoothed through zero."""
+
+
+@njit(cache=True, error_model="numpy")
+def torque_at(series: Any, time: float) -> tuple[float, float, float]:
+    """Return a bias and a sum of sinusoids [N m] at ``time`` [s].
+
+    ``series``: the bias (3), then for each sinusoid its frequency [rad/s], the factors of its sine
+    (3) and of its cosine (3).
+    """
+    x, y, z = series[0], series[1], series[2]
+    for i in range(3, series.size, 7):
+        sine, cosine = math.sin(series[i] * time), math.cos(series[i] * time)
+        x += series[i + 1] * sine + series[i + 4] * cosine
+        y += series[i + 2] * sine + series[i + 5] * cosine
+        z += series[i + 3] * sine + series[i + 6] * cosine
+    return x, y, z
+
+
+@njit(cache=True, error_model="numpy")
+def body_torque(series: Any, time: float, vehicle: Any) -> None:
+    """Add a torque on the bus whose components are in body axes."""
+    torque = torque_at(series, time)
+    for i in range(3):
+        vehicle.qfrc_passive[vehicle.bus_dof + 3 + i] += torque[i]
+
+
+@njit(cache=True, error_model="numpy")
+def inertial_torque(series: Any, time: float, vehicle: Any) -> None:
+    """Add a torque on the bus whose components are in inertial axes."""
+    torque = torque_at(series, time)
+    for dof in range(vehicle.bus_dof + 3, vehicle.bus_dof + 6):
+        s = vehicle.cdof[dof]  # a body axis, in world axes
+        vehicle.qfrc_passive[dof] += s[0] * torque[0] + s[1] * torque[1] + s[2] * torque[2]
+
+
+@njit(cache=True, error_model="numpy")
+def friction(pairs: Any, vehicle: Any) -> None:
+    """Add -c tanh(speed / FRICTION_SPEED) [N m] to hinges, given as dof, c, dof, c..."""
+    for i in range(0, pairs.size, 2):
+        dof = int(pairs[i])
+        vehicle.qfrc_passive[dof] -= pairs[i + 1] * math.tanh(vehicle.qvel[dof] / FRICTION_SPEED)
+
+
+@njit(cache=True, error_model="numpy")
+def ripple(hinges: Any, vehicle: Any) -> None:
+    """Add amplitude cos(cycles angle + phase) [N m] to hinges; their reaction is what carries them.
+
+    Five numbers for each: dof, place in ``qpos``, amplitude, cycles a turn, phase [rad]. J. Servín
+    Aguilar, Control de orientacion para satelites con compensacion de vibracion, UNAM 2022, (4.3).
+    """
+    for i in range(0, hinges.size, 5):
+        angle = vehicle.qpos[int(hinges[i + 1])]
+        torque = hinges[i + 2] * math.cos(hinges[i + 3] * angle + hinges[i + 4])
+        vehicle.qfrc_passive[int(hinges[i])] += torque

@@ -1,0 +1,53 @@
+"""Electric motors on hinges, as the actuators of a vehicle: voltages in, torques on joints out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from mjspace.actuators import State
+from mjspace.contract import Array, Measurement
+from mjspace.drive_tables import Pmsm
+from mjspace.plant import Vehicle
+from mjspace.pmsm import Drives
+
+
+@dataclass(frozen=True)
+class MotorDrives:
+    """Synchronous motors with their currents; each pushes against what carries its rotor."""
+
+    drives: Drives
+    order: Any
+    """Where each motor's speed is among gimbal rates and wheel speeds, shape (m,)."""
+
+    logged_as: ClassVar[str] = "motor_torque"
+    takes: ClassVar[str] = "voltage of shape (..., motors, 2) [V]"
+    acts_on: ClassVar[str] = "ctrl"
+    stateful: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, tables: Sequence[Pmsm]) -> Self:
+        """Return the drives of a vehicle's driven hinges; ``tables`` are in their order."""
+        sensed = [*vehicle.gimbal_dof, *vehicle.wheel_dof]
+        order = [sensed.index(dof) for dof in vehicle.drive_dof]
+        return cls(Drives.of(tables), np.array(order))
+
+    def reset(self, vehicles: int) -> State:
+        """Return currents of zero: "current", (N, m, 2) [A]."""
+        return {"current": np.zeros((vehicles, len(self.order), 2))}
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, Array, Array]:
+        """Return (state, mean torque of the step [N m], whether the voltage was cut)."""
+        speed = np.concatenate([truth.gimbal_rate, truth.wheel_speed], axis=-1)[..., self.order]
+        current, torque, applied = self.drives.advance(
+            state["current"], command.voltage, speed, step
+        )
+        cut = np.any(applied != command.voltage, axis=-1).astype(float)
+        return {"current": current}, torque, cut
+
+    def seen(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth with the motors' currents."""
+        return truth._replace(current=state["current"])
