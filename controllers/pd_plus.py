@@ -1,0 +1,212 @@
+"""PD+ attitude tracking: classical, modified, and robust to a bounded disturbance.
+
+J. Servín Aguilar, "Control de orientación para satélites con compensación de vibración", UNAM 2022
+(paper 001), chapter 3. The attitude error sigma_e is in modified Rodrigues parameters (MRP), from
+desired to body axes, of the set with |sigma_e| <= 1. Two signs of the printed (3.5) are wrong (E9):
+it gives 2 sigma / (1 - |sigma|^2) where there is no error. Here quaternions give it, so that
+neither attitude needs a set of its own, and q and -q are one attitude. The laws remember nothing:
+at half a turn the error changes sides, and with it the torque. All arrays may have leading vehicle
+axes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
+
+from . import pd_plus_kernels as kernels
+
+
+class State(NamedTuple):
+    """Memory of these laws: none."""
+
+
+class ClassicalSignals(NamedTuple):
+    """What the classical law shows; the torque is the sum of the last two."""
+
+    sigma_e: Array
+    """Attitude error, MRP, (..., 3)."""
+    w_e: Array
+    """Rate less the wanted rate [rad/s], body axes, (..., 3)."""
+    feedforward: Array
+    """M R_e^T wd' + wb x M wb [N m], (..., 3)."""
+    feedback: Array
+    """-kp sigma_e - kv w_e [N m], (..., 3)."""
+
+
+class ModifiedSignals(NamedTuple):
+    """What the modified law shows; the torque is the sum of the last two."""
+
+    sigma_e: Array
+    """Attitude error, MRP, (..., 3)."""
+    s: Array
+    """Composite error w_e + 2 lam sigma_e [rad/s], body axes, (..., 3)."""
+    feedforward: Array
+    """M wr' - H x wr [N m], (..., 3)."""
+    feedback: Array
+    """-(1 + |sigma_e|^2) sigma_e / 2 - Kc s [N m], (..., 3)."""
+
+
+class RobustSignals(NamedTuple):
+    """What the robust law shows: as the modified law, and the third part of the torque."""
+
+    sigma_e: Array
+    s: Array
+    feedforward: Array
+    feedback: Array
+    compensation: Array
+    """-tbar^2 s / (tbar |s| + eps), (3.19) [N m], (..., 3)."""
+
+
+def wanted_torque(
+    attitude: Array,
+    rate: Array,
+    momentum: Array,
+    reference: Reference,
+    inertia: Array,
+    gains: Array,
+) -> tuple[Array, Array, Array]:
+    """Return the torque [N m] of (3.18), or of (5.9), sigma_e and s [rad/s], each (..., 3).
+
+    ``attitude`` (..., 4) and ``rate`` (..., 3) [rad/s] are measured; ``momentum`` (..., 3) [N m s]
+    is M w of a rigid bus in chapter 3, or h, with the wheel's, in chapter 5; body axes. ``inertia``
+    (3, 3) [kg m^2]; ``gains`` is [lam, Kc, tbar, eps], units as in ``Robust``, eps above zero: a
+    tbar of zero leaves out the disturbance term and makes it (3.7).
+    """
+    torque, sigma_e, s, *_ = kernels.modified(attitude, rate, momentum, *reference, inertia, gains)
+    return torque, sigma_e, s
+
+
+@dataclass(frozen=True)
+class Classical:
+    """PD+: tau = M R_e^T wd' + wb x M wb - kp sigma_e - kv w_e, with wb = R_e^T wd.
+
+    The thesis takes kp = wn^2 and kv = 2 wn with wn = 3.5 rad/s; as sigma_e is a quarter of the
+    angle, that would need 4 wn^2 M and 2 wn M, and its loop has 0.5 rad/s and a damping of 0.6
+    (E26): it overshoots by 11.5 %.
+    """
+
+    batched: ClassVar[bool] = True
+
+    inertia: Array = gain("kg m^2", (3, 3))
+    """M: of the rigid bus, about its centre of mass, body axes."""
+    attitude_gain: float = gain("N m", default=12.25)
+    """kp, on the MRP: the stiffness is a quarter of it."""
+    rate_gain: float = gain("N m s/rad", default=7.0)
+    """kv, the same on each axis."""
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "attitude_gain", "rate_gain")
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return the empty state."""
+        return State()
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, TorqueCommand, ClassicalSignals]:
+        """Return the torque, the errors and the torque's parts."""
+        seen, rate = measurement.attitude, measurement.rate
+        torque, *shown = kernels.classical(seen, rate, *reference, self.inertia, self._gains)
+        return state, TorqueCommand(torque), ClassicalSignals(*shown)
+
+    @cached_property
+    def _gains(self) -> Array:
+        return np.array([self.attitude_gain, self.rate_gain])
+
+
+@dataclass(frozen=True)
+class Modified:
+    """Modified PD+, (3.7): tau = M wr' - M w x wr - (1 + |sigma_e|^2) sigma_e / 2 - Kc s.
+
+    wr = wb - 2 lam sigma_e and s = w - wr: both errors vanish exponentially (Lemma 3.1.1).
+    """
+
+    batched: ClassVar[bool] = True
+
+    inertia: Array = gain("kg m^2", (3, 3))
+    """M: of the rigid bus, about its centre of mass, body axes."""
+    attitude_gain: float = gain("1/s", default=1.0)
+    """lam: with s = 0, sigma_e vanishes at this rate."""
+    rate_gain: float = gain("N m s/rad", default=10.0)
+    """Kc, the same on each axis."""
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "attitude_gain", "rate_gain")
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return the empty state."""
+        return State()
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, TorqueCommand, ModifiedSignals]:
+        """Return the torque, the errors and the torque's parts."""
+        torque, *shown, _ = _rigid(measurement, reference, self.inertia, self._gains)
+        return state, TorqueCommand(torque), ModifiedSignals(*shown)
+
+    @cached_property
+    def _gains(self) -> Array:
+        return np.array([self.attitude_gain, self.rate_gain, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Robust:
+    """Modified PD+ with compensation of a disturbance of which only a bound is known, (3.18).
+
+    The third part, (3.19), is almost a relay: its slope at s = 0 is tbar^2 / eps, 16000 N m s/rad
+    by default, a pole at 1160 to 1540 rad/s on the thesis' bus. A loop whose period is more than
+    twice the inertia over that slope, 1.3 ms there, chatters. Errors end within 2.63 times the
+    ball printed in Corollary 3.2.1 (E25).
+    """
+
+    batched: ClassVar[bool] = True
+
+    inertia: Array = gain("kg m^2", (3, 3))
+    """M: of the rigid bus, about its centre of mass, body axes."""
+    attitude_gain: float = gain("1/s", default=1.0)
+    """lam: with s = 0, sigma_e vanishes at this rate."""
+    rate_gain: float = gain("N m s/rad", default=10.0)
+    """Kc, the same on each axis."""
+    disturbance_bound: float = gain("N m", default=0.04)
+    """tbar: largest norm of the disturbance; the thesis' reaches 0.0387 (E24)."""
+    smoothing: float = gain("W", default=1e-7)
+    """eps: what the relay may lose to smoothness."""
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "attitude_gain", "rate_gain", "disturbance_bound", "smoothing")
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return the empty state."""
+        return State()
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, TorqueCommand, RobustSignals]:
+        """Return the torque, the errors and the torque's parts."""
+        torque, *shown = _rigid(measurement, reference, self.inertia, self._gains)
+        return state, TorqueCommand(torque), RobustSignals(*shown)
+
+    @cached_property
+    def _gains(self) -> Array:
+        control = [self.attitude_gain, self.rate_gain]
+        return np.array([*control, self.disturbance_bound, self.smoothing])
+
+
+def _rigid(
+    measurement: Measurement, reference: Reference, inertia: Array, gains: Array
+) -> tuple[Array, ...]:
+    """Return the torque, the errors and the torque's parts for a bus whose momentum is M w."""
+    seen, rate = measurement.attitude, measurement.rate
+    momentum = kernels.rigid_momentum(inertia, rate)
+    parts: tuple[Array, ...] = kernels.modified(seen, rate, momentum, *reference, inertia, gains)
+    return parts
+
+
+def _require_positive(law: object, *names: str) -> None:
+    for name in names:
+        if not getattr(law, name) > 0.0:
+            raise ValueError(f"{name} is {getattr(law, name):g}: more than zero would do")

@@ -1,0 +1,152 @@
+"""Steering of a double-gimbal variable-speed control moment gyro (DGVSCMG): torque to gimbal rates.
+
+The outer gimbal turns by do about +z of the bus, the inner by di about +y of the outer, the wheel
+spins at W about +x of the inner, s; all through one point. In bus axes, with t = s x gi:
+
+    s = (co ci, so ci, -si)   gi = (-so, co, 0)   t = (co si, so si, ci)   go = (0, 0, 1)
+
+The columns are those of a rotation (E3: the printed second is not a unit vector). The momentum
+Jw W s gives the bus the torque -chi eta, eta = (do', di', W'), and chi loses rank at di = +-90 deg,
+where the outer gimbal turns the wheel about its own axis. J. Servín Aguilar, "Control de
+orientación para satélites con compensación de vibración", UNAM 2022 (paper 001), section 5.1. All
+arrays may have leading vehicle axes.
+"""
+
+# mypy: disable-error-code="no-untyped-call, call-arg"
+import math
+from typing import Any
+
+import numpy as np
+from numba import guvectorize, njit
+
+from mjspace.contract import Array
+
+
+def torque_matrix(gimbal_angle: Array, wheel_speed: Array, wheel_inertia: float) -> Array:
+    """Return chi (..., 3, 3) of (2.55): the torque on the bus [N m], body axes, is -chi eta (E18).
+
+    ``gimbal_angle`` (..., 2): do, di [rad]; ``wheel_speed`` (..., 1): W, relative to the inner
+    gimbal [rad/s]; ``wheel_inertia``: Jw [kg m^2], about the spin axis. Its columns are for do' and
+    di' [N m s] and for W' [kg m^2].
+    """
+    (so, si), (co, ci) = (np.moveaxis(part(gimbal_angle), -1, 0) for part in (np.sin, np.cos))
+    s = np.stack([co * ci, so * ci, -si], axis=-1)
+    ci_gi = np.stack([-so * ci, co * ci, np.zeros_like(so)], axis=-1)
+    t = np.stack([co * si, so * si, ci], axis=-1)
+    momentum = wheel_inertia * wheel_speed
+    return np.stack([momentum * ci_gi, -momentum * t, wheel_inertia * s], axis=-1)
+
+
+def steer(
+    torque: Array,
+    gimbal_angle: Array,
+    wheel_speed: Array,
+    wheel_inertia: float,
+    damping: float = 0.01,
+) -> tuple[Array, Array]:
+    """Return eta = -chi^-1 torque (..., 3), as do', di' [rad/s], W' [rad/s^2], and the authority.
+
+    ``torque`` (..., 3) [N m] is wanted on the bus, body axes; the others are as in
+    ``torque_matrix``. Ours, in place of the printed gamma (E17): the 1/cos(di) of (5.8) is damped
+    to cos(di) / (cos(di)^2 + damping^2). That is regular at every di, keeps its sign, and is at
+    most 1/(2 damping); at the default it loses 25 % of do' at 1 deg from the singularity, 0.3 % at
+    10 deg.
+
+    The authority (..., 1) measures how near that is: Jw |W cos(di)| [N m s], the torque about gi
+    for each rad/s of the outer gimbal. At W = 0 the rates are infinite or not a number.
+    """
+    eta, authority = _steer(torque, gimbal_angle, wheel_speed, wheel_inertia, damping)
+    return eta, authority
+
+
+def steer_as_printed(
+    torque: Array,
+    gimbal_angle: Array,
+    wheel_speed: Array,
+    wheel_inertia: float,
+    gamma_0: float = 0.01,
+    zeta: float = 10.0,
+) -> tuple[Array, Array]:
+    """Return what ``steer`` does, by (5.8) as printed, to show that it cannot fly (E17).
+
+    It has 1/(cos(di) + gamma), gamma = gamma_0 exp(zeta cos(di)^2) sin(di). The sign of zeta is
+    wrong: gamma is 17.8 at 5 deg, where 5 % of do' are left; the denominator is zero at -0.26 and
+    at -47.8 deg, and in between the command is reversed. With ``zeta`` = -10, as the text means it,
+    it is zero at -89.43 and 90.57 deg.
+    """
+    eta, authority = _steer_as_printed(
+        torque, gimbal_angle, wheel_speed, wheel_inertia, gamma_0, zeta
+    )
+    return eta, authority
+
+
+def gimbal_load(
+    rate: Array, gimbal_angle: Array, eta: Array, wheel_speed: Array, wheel_inertia: float
+) -> Array:
+    """Return what the motors of the outer and the inner gimbal must hold (..., 2) [N m].
+
+    A wheel that is turned and spun up needs (w + do' go + di' gi) x Jw W s + Jw W' s, and its
+    gimbals carry it, along go and gi: in a double gimbal they bear the whole output torque. The
+    thesis' speed loops leave it out (E20), and diverge. ``rate`` (..., 3) [rad/s] is the bus's, in
+    body axes; ``eta`` (..., 3) is do', di' [rad/s], W' [rad/s^2], commanded or measured; the others
+    are as in ``torque_matrix``. It is exact for a wheel of three equal inertias.
+    """
+    load: Array = _gimbal_load(rate, gimbal_angle, eta, wheel_speed, wheel_inertia)
+    return load
+
+
+@njit
+def _axes(angle: Any) -> Any:
+    """Return s, gi, t in bus axes."""
+    so, co, si, ci = math.sin(angle[0]), math.cos(angle[0]), math.sin(angle[1]), math.cos(angle[1])
+    return (co * ci, so * ci, -si), (-so, co, 0.0), (co * si, so * si, ci)
+
+
+@njit
+def _dot(a: Any, b: Any) -> Any:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(error_model="numpy")
+def _rates(torque: Any, angle: Any, speed: float, Jw: float, inverse: float, eta: Any) -> None:
+    """Write -chi^-1 torque, with ``inverse`` for 1/cos(di)."""
+    s, gi, t = _axes(angle)
+    eta[0] = -_dot(gi, torque) * inverse / (Jw * speed)
+    eta[1] = _dot(t, torque) / (Jw * speed)
+    eta[2] = -_dot(s, torque) / Jw
+
+
+_GIVEN = "(v),(g),(n),()"  # torque or rate, gimbal angles, wheel speed, wheel inertia
+
+
+@guvectorize(["void(f8[:],f8[:],f8[:],f8,f8,f8[:],f8[:])"], f"{_GIVEN},()->(v),(n)", cache=True)
+def _steer(
+    torque: Any, angle: Any, speed: Any, Jw: Any, damping: Any, eta: Any, authority: Any
+) -> None:
+    cosine = math.cos(angle[1])
+    inverse = cosine / (cosine * cosine + damping * damping)
+    _rates(torque, angle, speed[0], Jw, inverse, eta)
+    authority[0] = abs(Jw * speed[0] * cosine)
+
+
+@guvectorize(
+    ["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_GIVEN},(),()->(v),(n)", cache=True
+)
+def _steer_as_printed(
+    torque: Any, angle: Any, speed: Any, Jw: Any, gamma_0: Any, zeta: Any, eta: Any, authority: Any
+) -> None:
+    cosine = math.cos(angle[1])
+    gamma = gamma_0 * math.exp(zeta * cosine * cosine) * math.sin(angle[1])
+    _rates(torque, angle, speed[0], Jw, 1.0 / (cosine + gamma), eta)
+    authority[0] = abs(Jw * speed[0] * cosine)
+
+
+@guvectorize(["void(f8[:],f8[:],f8[:],f8[:],f8,f8[:])"], "(v),(g),(v),(n),()->(g)", cache=True)
+def _gimbal_load(rate: Any, angle: Any, eta: Any, speed: Any, Jw: Any, load: Any) -> None:
+    s, gi, _ = _axes(angle)
+    w = (rate[0] + eta[1] * gi[0], rate[1] + eta[1] * gi[1], rate[2] + eta[0])
+    h, dh = Jw * speed[0], Jw * eta[2]
+    x = w[1] * h * s[2] - w[2] * h * s[1] + dh * s[0]
+    y = w[2] * h * s[0] - w[0] * h * s[2] + dh * s[1]
+    z = w[0] * h * s[1] - w[1] * h * s[0] + dh * s[2]
+    load[0], load[1] = z, gi[0] * x + gi[1] * y

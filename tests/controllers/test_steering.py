@@ -1,0 +1,167 @@
+"""The steering of the double gimbal against the momentum that it steers."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from mjspace.controllers.steering import gimbal_load, steer, steer_as_printed, torque_matrix
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from mjspace.contract import Array
+
+JW = 0.016
+SPEED = np.array([73.0])
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def frame(angle: Array) -> Array:
+    """Return the inner gimbal's axes s, gi, t as columns, bus axes: Rz(do) Ry(di)."""
+    return Rotation.from_euler("ZY", angle).as_matrix()
+
+
+def momentum(angle: Array, speed: Array) -> Array:
+    return JW * speed[0] * frame(angle)[:, 0]
+
+
+def readings(count: int) -> tuple[Array, Array, Array]:
+    """Return torques [N m], gimbal angles [rad] and wheel speeds [rad/s], of either sign."""
+    rng = np.random.default_rng(3)
+    angle = rng.uniform(-np.pi, np.pi, (count, 2))
+    speed = rng.uniform(30.0, 200.0, (count, 1)) * rng.choice([-1.0, 1.0], (count, 1))
+    return rng.normal(size=(count, 3)), angle, speed
+
+
+def test_the_torque_is_the_momentum_lost() -> None:
+    """(2.55), with the axes of E3 and the sign of E18, by central differences."""
+    _, angles, speeds = readings(50)
+    h = 1e-5
+    for angle, speed in zip(angles, speeds, strict=True):
+        chi = torque_matrix(angle, speed, JW)
+        for eta in np.eye(3):
+            shift = h * eta
+            after = momentum(angle + shift[:2], speed + shift[2])
+            before = momentum(angle - shift[:2], speed - shift[2])
+            # h^2/6 of the third derivative, Jw W, and rounding of 1e-16 Jw W / h.
+            np.testing.assert_allclose(chi @ eta, (after - before) / (2.0 * h), atol=1e-9)
+
+
+def test_the_steering_inverts_it() -> None:
+    torque, angle, speed = readings(200)
+    eta, authority = steer(torque, angle, speed, JW, 0.0)
+    given = -np.einsum("nij,nj->ni", torque_matrix(angle, speed, JW), eta)
+    np.testing.assert_allclose(given, torque, atol=1e-12)
+    # (3.2 of no paper): what chi^T gi is, all of it the outer gimbal's.
+    along = np.einsum("nij,ni->nj", torque_matrix(angle, speed, JW), frame(angle)[:, :, 1])
+    np.testing.assert_allclose(authority[:, 0], np.linalg.norm(along, axis=-1), rtol=1e-12)
+    damped, _ = steer(torque, angle, speed, JW)
+    np.testing.assert_array_equal(damped[:, 1:], eta[:, 1:])
+
+
+def test_the_damped_command_is_bounded_and_keeps_its_sign() -> None:
+    inner = np.concatenate([np.radians(np.linspace(-180.0, 180.0, 3601)), [-np.pi / 2, np.pi / 2]])
+    angle = np.stack([np.zeros_like(inner), inner], axis=-1)
+    push = np.array([0.0, -1.0, 0.0])  # N m along -gi: all of it the outer gimbal's
+    outer = steer(push, angle, SPEED, JW)[0][:, 0] * JW * SPEED[0]
+    exact = steer(push, angle, SPEED, JW, 0.0)[0][:, 0] * JW * SPEED[0]
+    assert 49.0 < np.abs(outer).max() <= 50.0  # 1 / (2 damping), at acos(0.01) = 89.4 deg
+    assert np.abs(outer[-2:]).max() < 1e-11  # in the singularity it asks for nothing
+    regular = np.abs(np.cos(inner)) > 1e-9
+    assert (outer * exact)[regular].min() > 0.0
+    lost = (
+        1.0
+        - steer(push, np.radians([[0.0, 89.0], [0.0, 80.0]]), SPEED, JW)[0][:, 0]
+        / (steer(push, np.radians([[0.0, 89.0], [0.0, 80.0]]), SPEED, JW, 0.0)[0][:, 0])
+    )
+    np.testing.assert_allclose(lost, [0.247, 0.0033], rtol=0.01)
+
+
+def printed_share(inner: float, zeta: float = 10.0) -> float:
+    """Return the printed do' over the right one, at an inner angle in degrees."""
+    angle, push = np.array([0.0, np.radians(inner)]), np.array([0.0, -1.0, 0.0])
+    printed, _ = steer_as_printed(push, angle, SPEED, JW, 0.01, zeta)
+    return float(printed[0] / steer(push, angle, SPEED, JW, 0.0)[0][0])
+
+
+def test_the_printed_gamma_cannot_fly() -> None:
+    """E17: cos(di) / (cos(di) + gamma) should be near 1."""
+    cosine = np.cos(np.radians(5.0))
+    assert cosine / printed_share(5.0) - cosine == pytest.approx(17.8, abs=0.05)
+    assert printed_share(20.0) == pytest.approx(0.04, abs=2e-3)
+    for low, high, zero in ((-1.0, -0.1, -0.26), (-60.0, -20.0, -47.8)):
+        found = brentq(lambda inner: 1.0 / printed_share(inner), low, high)
+        assert found == pytest.approx(zero, abs=0.05)
+    assert printed_share(-47.0) < 0.0
+    assert printed_share(-1.0) < 0.0
+    for low, high, zero in ((-89.9, -85.0, -89.43), (90.1, 95.0, 90.57)):
+        found = brentq(lambda inner: 1.0 / printed_share(inner, -10.0), low, high)
+        assert found == pytest.approx(zero, abs=5e-3)
+    assert printed_share(45.0, -10.0) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_the_printed_form_differs_in_the_outer_rate_alone() -> None:
+    torque, angle, speed = readings(20)
+    printed, authority = steer_as_printed(torque, angle, speed, JW)
+    ours, same = steer(torque, angle, speed, JW)
+    np.testing.assert_array_equal(printed[:, 1:], ours[:, 1:])
+    np.testing.assert_array_equal(authority, same)
+
+
+def test_the_gimbals_bear_what_turns_the_wheel() -> None:
+    """By central differences of the wheel's momentum in inertial axes, the bus turning too."""
+    rng = np.random.default_rng(9)
+    _, angles, speeds = readings(30)
+    h = 1e-5
+    for angle, speed in zip(angles, speeds, strict=True):
+        rate, eta = rng.normal(size=3), rng.normal(size=3)
+
+        def inertial(
+            t: float,
+            rate: Array = rate,
+            angle: Array = angle,
+            speed: Array = speed,
+            eta: Array = eta,
+        ) -> Array:
+            now = momentum(angle + t * eta[:2], speed + t * eta[2])
+            return Rotation.from_rotvec(t * rate).apply(now)
+
+        torque = (inertial(h) - inertial(-h)) / (2.0 * h)
+        expected = [torque @ UP, torque @ frame(angle)[:, 1]]
+        found = gimbal_load(rate, angle, eta, speed, JW)
+        # h^2/6 of the third derivative, below 1e3 N m/s^2, and rounding.
+        np.testing.assert_allclose(found, expected, atol=2e-8)
+
+
+def test_the_gimbals_bear_the_whole_output() -> None:
+    load = gimbal_load(np.zeros(3), np.zeros(2), np.array([1.0, 0.5, 0.0]), np.array([150.0]), JW)
+    np.testing.assert_allclose(load, [-1.20, 2.40], atol=1e-12)  # E20
+    torque, angle, speed = readings(50)
+    eta, _ = steer(torque, angle, speed, JW, 0.0)
+    load = gimbal_load(np.zeros((50, 3)), angle, eta, speed, JW)
+    # No torque amplification: the bus gets about go what the outer motor gives, reversed.
+    np.testing.assert_allclose(load[:, 0], -torque[:, 2], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda torque, angle, speed: steer(torque, angle, speed, JW),
+        lambda torque, angle, speed: steer_as_printed(torque, angle, speed, JW),
+        lambda torque, angle, speed: (gimbal_load(torque, angle, torque, speed, JW),),
+        lambda _, angle, speed: (torque_matrix(angle, speed, JW),),
+    ],
+    ids=["damped", "printed", "load", "matrix"],
+)
+def test_alone_and_in_a_batch_are_the_same_bits(law: Any) -> None:
+    given = readings(64)
+    together = law(*given)
+    for i in range(64):
+        alone = law(*(part[i] for part in given))
+        assert all(np.array_equal(one, many[i]) for one, many in zip(alone, together, strict=True))
+
+
+def test_a_wheel_at_rest_has_no_answer() -> None:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        eta, authority = steer(np.ones(3), np.zeros(2), np.zeros(1), JW)
+    assert not np.isfinite(eta[:2]).any()
+    assert authority[0] == 0.0
