@@ -111,7 +111,7 @@ def fly_law(environment: Any, law: Any) -> tuple[list[np.ndarray], list[np.ndarr
     while True:
         states.append(environment.physics.get_state(INTEGRATION))
         measurement, reference = seen(step)
-        measurements.append(np.concatenate(measurement, axis=1)[0])
+        measurements.append(np.concatenate([m for m in measurement if m.size], axis=1)[0])
         if step.last():
             return states, measurements
         if memory is None:
