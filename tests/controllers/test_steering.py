@@ -51,7 +51,7 @@ def test_the_steering_inverts_it() -> None:
     eta, authority = steer(torque, angle, speed, JW, 0.0)
     given = -np.einsum("nij,nj->ni", torque_matrix(angle, speed, JW), eta)
     np.testing.assert_allclose(given, torque, atol=1e-12)
-    # (3.2 of no paper): what chi^T gi is, all of it the outer gimbal's.
+    # The authority is the torque about gi for each rad/s, which only the outer gimbal can give.
     along = np.einsum("nij,ni->nj", torque_matrix(angle, speed, JW), frame(angle)[:, :, 1])
     np.testing.assert_allclose(authority[:, 0], np.linalg.norm(along, axis=-1), rtol=1e-12)
     damped, _ = steer(torque, angle, speed, JW)
@@ -68,11 +68,8 @@ def test_the_damped_command_is_bounded_and_keeps_its_sign() -> None:
     assert np.abs(outer[-2:]).max() < 1e-11  # in the singularity it asks for nothing
     regular = np.abs(np.cos(inner)) > 1e-9
     assert (outer * exact)[regular].min() > 0.0
-    lost = (
-        1.0
-        - steer(push, np.radians([[0.0, 89.0], [0.0, 80.0]]), SPEED, JW)[0][:, 0]
-        / (steer(push, np.radians([[0.0, 89.0], [0.0, 80.0]]), SPEED, JW, 0.0)[0][:, 0])
-    )
+    near = np.radians([[0.0, 89.0], [0.0, 80.0]])
+    lost = 1.0 - steer(push, near, SPEED, JW)[0][:, 0] / steer(push, near, SPEED, JW, 0.0)[0][:, 0]
     np.testing.assert_allclose(lost, [0.247, 0.0033], rtol=0.01)
 
 
