@@ -4,15 +4,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from mjspace.controllers.motor_bench import SpeedBench
 from mjspace.controllers.motor_loops import CurrentLoop, SpeedLoop, estimates
 from numba import njit
 
+from mjspace.contract import Measurement, Reference
+from mjspace.drive_tables import Pmsm
 from mjspace.pmsm import Drives
 
 J, P, R, L, KM = 0.016, 6.0, 3.0, 6e-3, 2.0  # Table 4.1
 AMPLITUDE, RATE = 20.0, np.pi / 2.0
 LAMBDA, PSI, PHI = 0.1, 0.2, 3.0
 STEP, KEP = 1e-4, 3000.0
+MOTOR = Pmsm(pole_pairs=6, resistance=R, inductance=L, torque_constant=KM)
 OBSERVER = {"observer_gain": 1.0, "vibration_gain": 5.0, "adaptation_gain": 0.26}
 
 
@@ -297,3 +301,28 @@ def test_not_a_number_is_passed_on() -> None:
     with np.errstate(invalid="ignore"):
         _, asked = loop.step(loop.reset(speed), np.zeros((2, 1, 2)), speed, zero + 1.0, zero, zero)
     assert np.isnan(asked).tolist() == [[True], [False]]
+
+
+def test_the_bench_law_is_its_loops() -> None:
+    """A second of the law, of three motors in a batch, against the loops by themselves."""
+    law = SpeedBench(STEP)
+    speed, angle, motor = np.array([0.0, 0.5, -0.5]), np.zeros(3), Drives.of([MOTOR])
+    current = motor.reset((3,))
+    hold = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
+
+    def seen() -> Measurement:
+        attitude, rate = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)), np.zeros((3, 3))
+        return Measurement(attitude, rate, speed[:, None].copy(), current=current)
+
+    state = law.reset(seen(), hold)
+    for k in range(10000):
+        state, command, signals = law.step(state, k * STEP, seen(), hold)
+        current, torque, _ = motor.advance(current, command.voltage, speed[:, None], STEP)
+        turn(angle, speed, torque[:, 0], STEP)
+    alone = SpeedLoop(J, KM, STEP, 8.0, lead=1.0 / KEP, **OBSERVER)
+    same = bench(alone, 1, 1, 1.0)
+    assert signals.phi_hat.shape == (3, 1)
+    assert same.phi_hat[-1, 0] == pytest.approx(state.speed_memory[0, 0, 6], rel=1e-3)  # 9 periods
+    assert np.abs(signals.speed_error[:, 0]).max() < 1e-3  # without rejection 1.25e-2 rad/s
+    with pytest.raises(ValueError, match=r"RK4 would need steps of 3\.1e-07 s"):
+        SpeedBench(STEP, current_gain=9e6)

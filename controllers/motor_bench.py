@@ -1,0 +1,132 @@
+"""One motor on a bench follows a sinusoidal speed, and rejects the vibration of its rotor.
+
+Servín 2022 (paper 001), chapter 4, whose motor and gains are the defaults, but for the current's
+gain (erratum E21: 9e6 1/s needs steps of 3e-7 s).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, inf, pi, sin
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from mjspace.contract import Array, Measurement, Reference, VoltageCommand, gain
+
+from .motor_loops import CurrentLoop, SpeedLoop, estimates
+
+
+class BenchState(NamedTuple):
+    """Memory of the motor's loops."""
+
+    speed_memory: Array
+    """Of the speed loop, (..., 1, 7)."""
+    voltage_integral: Array
+    """Of the current loop [A s], (..., 1, 2)."""
+
+
+class BenchSignals(NamedTuple):
+    """What the bench shows; each of shape (..., 1)."""
+
+    speed_error: Array
+    """Wanted less measured speed [rad/s]."""
+    wanted_current: Array
+    """I_q* [A]."""
+    vibration_hat: Array
+    """Believed vibration torque on the rotor [N m]."""
+    phi_hat: Array
+    """Believed square of the vibration's cycles in a turn."""
+
+
+@dataclass(frozen=True)
+class SpeedBench:
+    """Speed and current loops of one motor whose speed is ``wheel_speed``, (..., 1)."""
+
+    batched: ClassVar[bool] = True
+
+    control_period: float = gain("s")
+    """Time from one step to the next."""
+    amplitude: float = gain("rad/s", default=20.0)
+    """Of the wanted speed, amplitude sin(frequency t)."""
+    frequency: float = gain("rad/s", default=0.5 * pi)
+    """Of the wanted speed."""
+    rotor_inertia: float = gain("kg m^2", default=0.016)
+    """J."""
+    pole_pairs: float = gain(default=6.0)
+    """p."""
+    resistance: float = gain("ohm", default=3.0)
+    """R."""
+    inductance: float = gain("H", default=6e-3)
+    """L."""
+    torque_constant: float = gain("N m/A", default=2.0)
+    """k_m."""
+    speed_gain: float = gain("N m s/rad", default=8.0)
+    """k_p."""
+    integral_gain: float = gain("N m/rad", default=0.0)
+    """k_i, ours."""
+    observer_gain: float = gain("N m s/rad", default=1.0)
+    """k_o."""
+    vibration_gain: float = gain("N m/rad", default=5.0)
+    """k_e; zero: no rejection."""
+    adaptation_gain: float = gain("1/(N m)^2", default=0.26)
+    """k_a; zero: psi^2 is known to be ``ratio``."""
+    ratio: float = gain(default=0.0)
+    """psi^2 to start from."""
+    current_gain: float = gain("1/s", default=3000.0)
+    """k_ep; k_ei is k_ep R/L."""
+    voltage_limit: float = gain("V", default=inf)
+    """Of the supply."""
+    current_limit: float = gain("A", default=inf)
+    """Largest wanted current."""
+
+    def __post_init__(self) -> None:
+        _ = self._speed_loop, self._current_loop  # which refuse gains that cannot be
+
+    def reset(self, measurement: Measurement, reference: Reference) -> BenchState:
+        """Return the state that knows of no vibration."""
+        speed = measurement.wheel_speed
+        return BenchState(self._speed_loop.reset(speed), self._current_loop.reset(speed))
+
+    def step(
+        self, state: BenchState, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[BenchState, VoltageCommand, BenchSignals]:
+        """Return the next state, the voltage and the estimates; the reference does not matter."""
+        speed, current = measurement.wheel_speed, measurement.current
+        wanted = np.full_like(speed, self.amplitude * sin(self.frequency * time))
+        by_then = self.frequency * (time + 1.0 / self.current_gain)
+        slope = np.full_like(speed, self.amplitude * self.frequency * cos(by_then))
+        memory, asked = self._speed_loop.step(
+            state.speed_memory, current, speed, wanted, slope, np.zeros_like(speed)
+        )
+        integral, voltage = self._current_loop.step(state.voltage_integral, current, asked, speed)
+        seen = estimates(memory)
+        shown = BenchSignals(wanted - speed, asked, seen.z1_hat, seen.phi_hat)
+        return BenchState(memory, integral), VoltageCommand(voltage), shown
+
+    @cached_property
+    def _speed_loop(self) -> SpeedLoop:
+        return SpeedLoop(
+            inertia=self.rotor_inertia,
+            torque_constant=self.torque_constant,
+            period=self.control_period,
+            speed_gain=self.speed_gain,
+            integral_gain=self.integral_gain,
+            observer_gain=self.observer_gain,
+            vibration_gain=self.vibration_gain,
+            adaptation_gain=self.adaptation_gain,
+            lead=1.0 / self.current_gain,
+            ratio=self.ratio,
+            current_limit=self.current_limit,
+        )
+
+    @cached_property
+    def _current_loop(self) -> CurrentLoop:
+        return CurrentLoop(
+            pole_pairs=self.pole_pairs,
+            resistance=self.resistance,
+            inductance=self.inductance,
+            torque_constant=self.torque_constant,
+            period=self.control_period,
+            proportional_gain=self.current_gain,
+            voltage_limit=self.voltage_limit,
+        )
