@@ -69,6 +69,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         "wheel_axes": vehicle.wheel_axes,
         "wheel_inertia": vehicle.wheel_inertia,
         "control_period": scenario.rates.control,
+        "inner_period": scenario.rates.physics,
     }
     flown: dict[str, Any] = {}
     sources = {}

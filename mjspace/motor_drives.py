@@ -45,7 +45,7 @@ class MotorDrives:
         current, torque, applied = self.drives.advance(
             state["current"], command.voltage, speed, step
         )
-        cut = np.any(applied != command.voltage, axis=-1).astype(float)
+        cut = (applied != command.voltage).any(axis=-1)
         return {"current": current}, torque, cut
 
     def seen(self, state: State, truth: Measurement) -> Measurement:

@@ -6,16 +6,14 @@ velocity in BODY axes. The body origin is the vehicle's centre of mass, but for 
 """
 
 import gzip
-import re
 import warnings
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from mjspace import composition, guards, mass
+from mjspace import addresses, composition, guards, mass
 from mjspace.contract import Array
 from mjspace.tables import Initial, PlantTable, Rates
 
@@ -82,12 +80,12 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
 
     return Vehicle(
         model=model,
-        inertia=_frozen(gyrostat),
-        wheel_axes=_frozen(axes),
-        wheel_inertia=_frozen(np.full(len(axes), wheels.inertia)),
+        inertia=addresses.frozen(gyrostat),
+        wheel_axes=addresses.frozen(axes),
+        wheel_inertia=addresses.frozen(np.full(len(axes), wheels.inertia)),
         torque_limit=wheels.torque_limit or np.inf,
         speed_limit=wheels.speed_limit or np.inf,
-        **_addresses(model, len(axes), table.drives),
+        **addresses.of(model, len(axes), table.drives),
     )
 
 
@@ -99,7 +97,7 @@ def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
     """
     reaction_wheels = len(vehicle.wheel_axes)
     driven = vehicle.motors[reaction_wheels:]
-    return replace(vehicle, model=model, **_addresses(model, reaction_wheels, driven))
+    return replace(vehicle, model=model, **addresses.of(model, reaction_wheels, driven))
 
 
 def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
@@ -204,47 +202,3 @@ def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
             f"give wheel_speed, or plant.wheels.axes that span it"
         )
     return speeds
-
-
-def _addresses(model: Any, wheels: int, driven: Iterable[str]) -> dict[str, Any]:
-    """Return where things are in a model of that many reaction wheels, and of ``driven`` hinges."""
-    reaction_wheels = [f"wheel_{index}" for index in range(wheels)]
-    drives = _by_motor(model, driven)
-    gimbals = [name for name in drives if not name.endswith("wheel")]
-    spun = [*reaction_wheels, *(name for name in drives if name not in gimbals)]
-    return {
-        "wheel_dof": _where(model.joint(name).dofadr for name in spun),
-        "gimbal_dof": _where(model.joint(name).dofadr for name in gimbals),
-        "gimbal_qpos": _where(model.joint(name).qposadr for name in gimbals),
-        "drive_dof": _where(model.joint(name).dofadr for name in drives),
-        "motors": (*reaction_wheels, *drives),
-        **{name: _sensor(model, name) for name in ("momentum", "kinetic", "environment")},
-    }
-
-
-def _by_motor(model: Any, driven: Iterable[str]) -> list[str]:
-    """Return the ``driven`` hinges in the order of their motors in ``ctrl``.
-
-    Raises:
-        ValueError: no motor turns one of them, or a motor is left without its drive.
-    """
-    turned = [model.joint(model.actuator_trnid[i, 0]).name for i in range(model.nu)]
-    parts = [name for name in turned if not re.fullmatch(r"wheel_\d+", name)]
-    for name in driven:
-        if name not in parts:
-            raise ValueError(f"plant.drives.{name}: no motor turns it: have {', '.join(parts)}")
-    return [name for name in parts if name in set(driven)]
-
-
-def _where(addresses: Iterable[Any]) -> Any:
-    return _frozen(np.array([address[0] for address in addresses], dtype=int))
-
-
-def _sensor(model: Any, name: str) -> slice:
-    sensor = model.sensor(name)
-    return slice(int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))
-
-
-def _frozen(array: Any) -> Any:
-    array.setflags(write=False)
-    return array

@@ -1,0 +1,216 @@
+"""The cascade that flies a satellite with a double-gimbal CMG, from attitude to volts.
+
+Attitude law, steering law, three speed loops with adaptive rejection of the wheel's vibration, and
+three current loops, for a wheel of variable speed (DGVSCMG). J. Servín Aguilar, "Control de
+orientación para satélites con compensación de vibración", UNAM 2022 (paper 001), chapter 5, with
+what it takes to fly it on bodies and hinges: the gimbals' motors hold the gyroscopic torque, which
+the thesis leaves out (E20), and each speed loop has the inertia that its motor turns (E19). All
+arrays may have leading vehicle axes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from mjspace.contract import Array, Measurement, Reference, VoltageCommand, gain
+
+from . import motor_loops, pd_plus, steering
+
+
+class State(NamedTuple):
+    """What the motors' loops remember; the attitude and steering laws remember nothing."""
+
+    wheel_wanted: Array
+    """Wanted wheel speed [rad/s], (..., 1)."""
+    speed_memory: Array
+    """Of the speed loops, (..., 3, 7)."""
+    voltage_integral: Array
+    """Of the current loops [A s], (..., 3, 2)."""
+
+
+class SpeedCommand(NamedTuple):
+    """What the attitude loop asks of the motors' loops, for its period."""
+
+    gimbal_rate: Array
+    """[rad/s], outer and inner, (..., 2)."""
+    acceleration: Array
+    """Of each hinge [rad/s^2], (..., 3); the gimbals' is left at zero, the wheel's is wanted."""
+    load: Array
+    """Gyroscopic torque that each motor is to hold [N m], (..., 3); none on the wheel's."""
+
+
+class Signals(NamedTuple):
+    """What the cascade shows."""
+
+    sigma_e: Array
+    """Attitude error, modified Rodrigues parameters, (..., 3)."""
+    s: Array
+    """Composite error [rad/s], body axes, (..., 3)."""
+    torque: Array
+    """Wanted on the bus [N m], body axes, (..., 3)."""
+    authority: Array
+    """Jw |W cos(di)| [N m s], zero where the steering is singular, (..., 1)."""
+    speed_error: Array
+    """Wanted less measured speed of each hinge [rad/s], (..., 3)."""
+    vibration_hat: Array
+    """Believed vibration torque on the wheel [N m], (..., 1)."""
+    phi_hat: Array
+    """Believed square of the vibration's cycles in a turn, (..., 1)."""
+
+
+@dataclass(frozen=True)
+class Cascade:
+    """The attitude law (5.9), steering (5.7), speed loops (4.19)-(4.22), current loops (4.36)."""
+
+    batched: ClassVar[bool] = True
+
+    inertia: Array = gain("kg m^2", (3, 3))
+    """Mb: of the bus alone, body axes."""
+    control_period: float = gain("s")
+    """Of the attitude law and the steering."""
+    inner_period: float = gain("s")
+    """Of the motors' loops."""
+    rotor_inertia: float = gain("kg m^2", default=0.016)
+    """Jw: of the wheel about its spin axis."""
+    attitude_gain: float = gain("1/s", default=1.0)
+    """lam."""
+    rate_gain: float = gain("N m s/rad", default=10.0)
+    """Kc, the same on each axis."""
+    disturbance_bound: float = gain("N m", default=0.05)
+    """tbar: largest norm of the disturbance."""
+    smoothing: float = gain("W", default=1e-6)
+    """eps: what the relay of the disturbance's compensation may lose to smoothness."""
+    steering_damping: float = gain(default=0.01)
+    """g0: cos(di) at which the steering loses half."""
+    gyroscopic_feedforward: float = gain(default=1.0)
+    """Share of the gyroscopic torque that the gimbals' motors are told of; the thesis has 0."""
+    turned_inertia: Array = gain("kg m^2", (3,), default=(0.018, 0.017, 0.016))
+    """J that each motor turns: outer gimbal, inner gimbal, wheel."""
+    speed_gain: Array = gain("N m s/rad", (3,), default=(2.0, 2.0, 0.32))
+    """k_p."""
+    integral_gain: Array = gain("N m/rad", (3,), default=(0.0, 0.0, 0.0))
+    """k_i, ours."""
+    observer_gain: Array = gain("N m s/rad", (3,), default=(0.0, 0.0, 1.0))
+    """k_o."""
+    vibration_gain: Array = gain("N m/rad", (3,), default=(0.0, 0.0, 5.0))
+    """k_e; zero: no rejection of vibration."""
+    adaptation_gain: Array = gain("1/(N m)^2", (3,), default=(0.0, 0.0, 1.0))
+    """k_a."""
+    current_gain: float = gain("1/s", default=3000.0)
+    """k_ep; k_ei is k_ep R/L."""
+    pole_pairs: Array = gain(shape=(3,), default=(4.0, 4.0, 6.0))
+    """p of each motor."""
+    resistance: Array = gain("ohm", (3,), default=(2.5, 2.5, 3.0))
+    """R."""
+    inductance: Array = gain("H", (3,), default=(4.5e-3, 4.5e-3, 6e-3))
+    """L."""
+    torque_constant: Array = gain("N m/A", (3,), default=(1.5, 1.5, 2.0))
+    """k_m."""
+
+    def __post_init__(self) -> None:
+        _ = self._speed_loop, self._current_loop  # which refuse gains that cannot be
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return the state that wants the wheel as fast as it is and believes in no vibration."""
+        speed = _speeds(measurement)
+        return State(
+            np.array(measurement.wheel_speed),
+            self._speed_loop.reset(speed),
+            self._current_loop.reset(speed),
+        )
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, SpeedCommand, Signals]:
+        """Return the gimbals' rates and the wheel's acceleration for the wanted torque."""
+        angle, wheel_speed = measurement.gimbal_angle, measurement.wheel_speed
+        torque, sigma_e, s = pd_plus.wanted_torque(
+            measurement.attitude,
+            measurement.rate,
+            self._momentum(measurement),
+            reference,
+            self.inertia,
+            self._attitude_gains,
+        )
+        eta, authority = steering.steer(
+            torque, angle, wheel_speed, self.rotor_inertia, self.steering_damping
+        )
+        load = steering.gimbal_load(measurement.rate, angle, eta, wheel_speed, self.rotor_inertia)
+        still, none = np.zeros_like(load), np.zeros_like(wheel_speed)
+        command = SpeedCommand(
+            eta[..., :2],
+            np.concatenate([still, eta[..., 2:]], axis=-1),
+            np.concatenate([self.gyroscopic_feedforward * load, none], axis=-1),
+        )
+        believed = motor_loops.estimates(state.speed_memory[..., 2:, :])
+        wanted = np.concatenate([command.gimbal_rate, state.wheel_wanted], axis=-1)
+        error = wanted - _speeds(measurement)
+        shown = Signals(sigma_e, s, torque, authority, error, believed.z1_hat, believed.phi_hat)
+        return state, command, shown
+
+    def inner(
+        self, state: State, time: float, command: SpeedCommand, measurement: Measurement
+    ) -> tuple[State, VoltageCommand]:
+        """Return the motors' voltages for the wanted speeds."""
+        speed = _speeds(measurement)
+        wanted = np.concatenate([command.gimbal_rate, state.wheel_wanted], axis=-1)
+        memory, current = self._speed_loop.step(
+            state.speed_memory,
+            measurement.current,
+            speed,
+            wanted,
+            command.acceleration,
+            command.load,
+        )
+        integral, voltage = self._current_loop.step(
+            state.voltage_integral, measurement.current, current, speed
+        )
+        ahead = state.wheel_wanted + self.inner_period * command.acceleration[..., 2:]
+        return State(ahead, memory, integral), VoltageCommand(voltage)
+
+    def _momentum(self, measurement: Measurement) -> Array:
+        """Return h = Mb w + Jw W s [N m s], body axes, (..., 3)."""
+        spin = self.rotor_inertia * measurement.wheel_speed
+        outer, inner = measurement.gimbal_angle[..., :1], measurement.gimbal_angle[..., 1:]
+        axis = [np.cos(outer) * np.cos(inner), np.sin(outer) * np.cos(inner), -np.sin(inner)]
+        # Written out: BLAS may round one vehicle's product differently in a batch than alone.
+        of_bus = np.sum(self.inertia * measurement.rate[..., None, :], axis=-1)
+        total: Array = of_bus + spin * np.concatenate(axis, axis=-1)
+        return total
+
+    @cached_property
+    def _attitude_gains(self) -> Array:
+        control = [self.attitude_gain, self.rate_gain]
+        return np.array([*control, self.disturbance_bound, self.smoothing])
+
+    @cached_property
+    def _speed_loop(self) -> motor_loops.SpeedLoop:
+        return motor_loops.SpeedLoop(
+            inertia=self.turned_inertia,
+            torque_constant=self.torque_constant,
+            period=self.inner_period,
+            speed_gain=self.speed_gain,
+            integral_gain=self.integral_gain,
+            observer_gain=self.observer_gain,
+            vibration_gain=self.vibration_gain,
+            adaptation_gain=self.adaptation_gain,
+            lead=1.0 / self.current_gain,
+        )
+
+    @cached_property
+    def _current_loop(self) -> motor_loops.CurrentLoop:
+        return motor_loops.CurrentLoop(
+            pole_pairs=self.pole_pairs,
+            resistance=self.resistance,
+            inductance=self.inductance,
+            torque_constant=self.torque_constant,
+            period=self.inner_period,
+            proportional_gain=self.current_gain,
+        )
+
+
+def _speeds(measurement: Measurement) -> Array:
+    """Return the hinges' speeds: outer gimbal, inner gimbal, wheel [rad/s], (..., 3)."""
+    return np.concatenate([measurement.gimbal_rate, measurement.wheel_speed], axis=-1)
