@@ -88,8 +88,8 @@ def gain(unit: str = "", shape: tuple[int | None, ...] = (), default: Any = MISS
     """Declare a law's or a reference's parameter: its SI unit and array shape (None: any length).
 
     The scenario's loader checks the table against both. A gain without a default that is named
-    like one of the plant's properties (``inertia``, ``wheel_axes``, ``wheel_inertia``) or
-    ``control_period`` may be left out of the table: it is then taken from the vehicle as flown.
+    like one of the plant's properties (``inertia``, ``wheel_axes``, ``wheel_inertia``), or
+    ``control_period`` or ``inner_period``, may be left out of the table: it is then taken from the vehicle as flown.
     """
     metadata = {"unit": unit, "shape": shape}
     if default is MISSING:

@@ -48,11 +48,12 @@ def _laws() -> list[str]:
         module = import_module(f"mjspace.controllers.{path.stem}")
         for name, kind in vars(module).items():
             if is_dataclass(kind) and kind.__module__ == module.__name__:
-                gains = ", ".join(_gain(f) for f in fields(kind) if "unit" in f.metadata)
-                lines.append(f"| `{path.stem}:{name}` | {gains} |")
+                gains = [_gain(f) for f in fields(kind) if "unit" in f.metadata]
+                if gains or not fields(kind):  # else a part of a law
+                    lines.append(f"| `{path.stem}:{name}` | {', '.join(gains)} |")
     closing = """
-A gain without a default must be given, but for `inertia`, `wheel_axes`, `wheel_inertia` and
-`control_period`: left out, they are those of the vehicle and the scenario as flown. Arrays may come
+A gain without a default must be given, but for `inertia`, `wheel_axes`, `wheel_inertia`,
+`control_period` and `inner_period` (the integration step): left out, they are those of the vehicle and the scenario as flown. Arrays may come
 from a CSV file: `file = "turn.csv"`, with a header that names the gains
 (`time,attitude0,attitude1,attitude2,attitude3`)."""
     return [*lines, closing, ""]
@@ -72,8 +73,9 @@ def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseM
         inner = _table_in(field.annotation)
         if inner is not None:
             name = f"{path.strip('[]')}.{key}".lstrip(".")
-            many = get_origin(field.annotation) is list
-            yield from _tables(inner, f"[[{name}]]" if many else f"[{name}]")
+            many = get_origin(field.annotation)
+            heading = {list: f"[[{name}]]", dict: f"[{name}.<name>]"}.get(many, f"[{name}]")
+            yield from _tables(inner, heading)
 
 
 def _table_in(annotation: Any) -> type[BaseModel] | None:
@@ -86,7 +88,8 @@ def _value(field: FieldInfo) -> str:
     """Return what a key holds, as a person says it."""
     annotation = field.annotation
     if _table_in(annotation):
-        return "tables" if get_origin(annotation) is list else "table"
+        many = {list: "tables", dict: "tables by name"}
+        return many.get(get_origin(annotation), "table")
     return _kind(Annotated[annotation, *field.metadata] if field.metadata else annotation)
 
 
@@ -96,6 +99,8 @@ def _kind(annotation: Any) -> str:
         return " or ".join(f'`"{choice}"`' for choice in parts)
     if origin is UnionType or origin is Union:
         return " or ".join(_kind(part) for part in parts if part is not NoneType)
+    if origin is dict:
+        return f"table of {_kind(parts[1])}s by name"
     sizes, unit, scalar = _shape(annotation)
     word = {float: "number", int: "whole number", str: "text", bool: "true or false"}[scalar]
     count = f"{' x '.join(sizes)} {word}s" if sizes else word

@@ -60,9 +60,8 @@ def test_both_quaternions_are_one_attitude() -> None:
 
 def test_nothing_is_asked_of_a_satellite_that_is_where_it_should_be() -> None:
     q = np.array([[1.0, 0.0, 0.0, 0.0]])
-    still = Measurement(
-        q, np.zeros((1, 3)), np.full((1, 1), 73.0), *[np.zeros((1, 2))] * 2, np.zeros((1, 3, 2))
-    )
+    none = np.zeros((1, 2))
+    still = Measurement(q, np.zeros((1, 3)), np.full((1, 1), 73.0), none, none, np.zeros((1, 3, 2)))
     _, command, signals, voltage = flown(cascade(), still)
     for asked in (*command, signals.sigma_e, signals.s, signals.torque, signals.speed_error):
         np.testing.assert_allclose(asked, 0.0, atol=1e-15)
