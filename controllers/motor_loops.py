@@ -6,9 +6,9 @@ called once a period.
 
 Where this differs from the paper, and why:
 
-- Its equations are continuous. Sampled by explicit Euler the observer leaves an error a thousand
-  times larger; here the internal model turns exactly by the angle the rotor turned, and what drives
-  it is the mean of the measurements at both ends of a period.
+- Its equations are continuous. A symplectic Euler step on what is measured at a period's start
+  leaves 1.6e-6 rad/s on the bench of chapter 4; here the internal model turns exactly by the angle
+  the rotor turned, driven by the mean of the measurements at both ends: 3e-8 rad/s.
 - (4.34) and (4.35) are two forms of one sum, whose terms of ka J W^2 z2 / 2, up to 150, cancel in
   the other form, in which no acceleration occurs either: phi_hat changes by
   -ka W z2_hat [T (z1_hat + k_m I_q) - J (W after - W before)]. It has erratum E15, z2_hat for z2's
