@@ -74,7 +74,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
     wheels = table.wheels
     axes = mass.unit_axes(wheels)
     body = spec.body("bus")
-    inertial, gyrostat = mass.bus(table, mass.tensor(body.inertia, body.iquat))
+    inertial, gyrostat = mass.bus(table, _own_inertia(body))
     model = _compile(spec, inertial)
     guards.check(model)
 
@@ -168,6 +168,7 @@ def from_bytes(data: bytes) -> Any:
 def _compile(spec: Any, inertial: mass.Inertial) -> Any:
     body, moments = spec.body("bus"), inertial.inertia
     body.mass, body.ipos, _, body.iquat = inertial
+    body.fullinertia = np.full(6, np.nan)  # not given: the principal moments are
     excess = moments[2] - moments[1] - moments[0]
     # MuJoCo's compiler refuses what is not physical; its dynamics only need it positive.
     body.inertia = moments if excess <= 0.0 else np.full(3, moments.mean())
@@ -183,6 +184,14 @@ def _compile(spec: Any, inertial: mass.Inertial) -> Any:
         model.body("bus").inertia = moments
         mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
+
+
+def _own_inertia(body: Any) -> Array:
+    """Return the inertia matrix (3, 3) [kg m^2] of the bus as its model has it."""
+    if np.isnan(body.fullinertia[0]):
+        return mass.tensor(body.inertia, body.iquat)
+    xx, yy, zz, xy, xz, yz = body.fullinertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
