@@ -54,6 +54,15 @@ def test_statistics_of_a_scalar(statistic: str, value: float) -> None:
     assert measure(signal="truth.error", statistic=statistic) == pytest.approx(value, rel=1e-15)
 
 
+def test_a_signal_below_zero_is_judged_without_a_warning() -> None:
+    falling = -np.arange(1.0, 7.0)
+    for statistic, value in (("final", -6.0), ("mean", -3.5), ("rms", np.sqrt(91.0 / 6.0))):
+        check = Check.model_validate(
+            {"name": "x", "signal": "truth.error", "statistic": statistic, "below": 1.0}
+        )
+        assert judge(Tape(falling, RATE), [check])[0].measured == pytest.approx(value)
+
+
 def test_drift_is_from_the_start_of_the_window_not_of_a_chunk() -> None:
     ramp = np.arange(6.0)
     check = Check(name="x", signal="truth.error", statistic="drift", below=1.0)
