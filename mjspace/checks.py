@@ -1,5 +1,6 @@
 """Judging a flight: each check is a statistic of one logged signal over a window of time."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -123,7 +124,7 @@ def _measure(log: Log, check: Check) -> float:
         "drift": peak,
         "min": least,
         "mean": total / count,
-        "rms": abs(total / count) ** 0.5,  # squares are summed only where it is asked for
+        "rms": math.sqrt(abs(total / count)),  # squares are summed only where it is asked for
         "final": last,
     }[check.statistic]
     return measured / scale

@@ -89,7 +89,8 @@ def gain(unit: str = "", shape: tuple[int | None, ...] = (), default: Any = MISS
 
     The scenario's loader checks the table against both. A gain without a default that is named
     like one of the plant's properties (``inertia``, ``wheel_axes``, ``wheel_inertia``), or
-    ``control_period`` or ``inner_period``, may be left out of the table: it is then taken from the vehicle as flown.
+    ``control_period`` or ``inner_period``, may be left out of the table: it is then taken from the
+    vehicle as flown.
     """
     metadata = {"unit": unit, "shape": shape}
     if default is MISSING:

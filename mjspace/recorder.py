@@ -20,15 +20,29 @@ UNITS = {
     "/truth": {
         "rate": "rad/s",
         "wheel_speed": "rad/s",
+        "gimbal_angle": "rad",
+        "gimbal_rate": "rad/s",
+        "current": "A",
         "position": "m",
         "velocity": "m/s",
         "momentum": "N m s",
         "energy": "J",
         "attitude_error": "rad",
     },
-    "/measurement": {"rate": "rad/s", "wheel_speed": "rad/s"},
+    "/measurement": {
+        "rate": "rad/s",
+        "wheel_speed": "rad/s",
+        "gimbal_angle": "rad",
+        "gimbal_rate": "rad/s",
+        "current": "A",
+    },
     "/reference": {"rate": "rad/s", "acceleration": "rad/s^2"},
-    "/command": {"torque": "N m", "wheel_torque": "N m"},
+    "/command": {
+        "torque": "N m",
+        "wheel_torque": "N m",
+        "motor_torque": "N m",
+        "thruster_torque": "N m",
+    },
     "/disturbance": {"force": "N", "torque": "N m"},
 }
 

@@ -15,7 +15,10 @@ from mjspace.panels import LAW_PANELS, STANDARD, Panel
 from mjspace.plot import figure, plot
 from mjspace.scenario import Check
 
-ERROR, RATE, _, _, SPEED, MOMENTUM, _ = STANDARD
+ERROR, RATE, SPEED, MOMENTUM = (
+    next(panel for panel in STANDARD if panel.field == field)
+    for field in ("attitude_error", "rate", "wheel_speed", "momentum")
+)
 
 
 @pytest.fixture(scope="module")

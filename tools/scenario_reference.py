@@ -53,9 +53,9 @@ def _laws() -> list[str]:
                     lines.append(f"| `{path.stem}:{name}` | {', '.join(gains)} |")
     closing = """
 A gain without a default must be given, but for `inertia`, `wheel_axes`, `wheel_inertia`,
-`control_period` and `inner_period` (the integration step): left out, they are those of the vehicle and the scenario as flown. Arrays may come
-from a CSV file: `file = "turn.csv"`, with a header that names the gains
-(`time,attitude0,attitude1,attitude2,attitude3`)."""
+`control_period` and `inner_period` (the integration step): left out, they are those of the
+vehicle and the scenario as flown. Arrays may come from a CSV file: `file = "turn.csv"`, with a
+header that names the gains (`time,attitude0,attitude1,attitude2,attitude3`)."""
     return [*lines, closing, ""]
 
 
