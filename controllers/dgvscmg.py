@@ -84,6 +84,10 @@ class Cascade:
     """eps: what the relay of the disturbance's compensation may lose to smoothness."""
     steering_damping: float = gain(default=0.01)
     """g0: cos(di) at which the steering loses half."""
+    gimbal_rate_limit: float = gain("rad/s", default=np.inf)
+    """Fastest gimbal rate that is asked for, ours: beyond it the whole torque is scaled down."""
+    wheel_acceleration_limit: float = gain("rad/s^2", default=np.inf)
+    """Largest wheel acceleration that is asked for, likewise."""
     gyroscopic_feedforward: float = gain(default=1.0)
     """Share of the gyroscopic torque that the gimbals' motors are told of; the thesis has 0."""
     turned_inertia: Array = gain("kg m^2", (3,), default=(0.018, 0.017, 0.016))
@@ -137,6 +141,7 @@ class Cascade:
         eta, authority = steering.steer(
             torque, angle, wheel_speed, self.rotor_inertia, self.steering_damping
         )
+        eta = eta * self._share(eta)
         load = steering.gimbal_load(measurement.rate, angle, eta, wheel_speed, self.rotor_inertia)
         still, none = np.zeros_like(load), np.zeros_like(wheel_speed)
         command = SpeedCommand(
@@ -170,6 +175,12 @@ class Cascade:
         ahead = state.wheel_wanted + self.inner_period * command.acceleration[..., 2:]
         return State(ahead, memory, integral), VoltageCommand(voltage)
 
+    def _share(self, eta: Array) -> Array:
+        """Return how much of ``eta`` the limits admit, (..., 1): its torque keeps its direction."""
+        excess = np.max(np.abs(eta) / self._limits, axis=-1, keepdims=True)
+        share: Array = 1.0 / np.maximum(excess, 1.0)
+        return share
+
     def _momentum(self, measurement: Measurement) -> Array:
         """Return h = Mb w + Jw W s [N m s], body axes, (..., 3)."""
         spin = self.rotor_inertia * measurement.wheel_speed
@@ -184,6 +195,10 @@ class Cascade:
     def _attitude_gains(self) -> Array:
         control = [self.attitude_gain, self.rate_gain]
         return np.array([*control, self.disturbance_bound, self.smoothing])
+
+    @cached_property
+    def _limits(self) -> Array:
+        return np.array([*[self.gimbal_rate_limit] * 2, self.wheel_acceleration_limit])
 
     @cached_property
     def _speed_loop(self) -> motor_loops.SpeedLoop:
