@@ -139,9 +139,7 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
     def __init__(self, assembly: Assembly) -> None:
         scenario = assembly.scenario
         if not isinstance(assembly.actuators, ReactionWheels):
-            raise InputError(
-                "plant.drives: an environment's action is a torque for reaction wheels"
-            )
+            raise InputError("plant: an environment's action is a torque for reaction wheels")
         self._wheels, self._inertia = assembly.actuators, assembly.vehicle.inertia
         self._control, self._last = scenario.rates.control, last_period(scenario)
         self._bounds = [

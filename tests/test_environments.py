@@ -20,6 +20,7 @@ from dm_env import StepType, TimeStep, test_utils
 from mjspace import environments
 from mjspace.assembly import assemble
 from mjspace.contract import Measurement, Reference
+from mjspace.errors import InputError
 from mjspace.guards import ModelWarning
 from mjspace.loading import load, scenario_names
 from mjspace.plant import UnphysicalInertiaWarning
@@ -47,6 +48,10 @@ WIND = """
 def wind(time, truth):
     return [time, 0.0, 1.0], truth.rate * [1.0, 2.0, 3.0] - time
 """
+
+
+def wheeled(name: str) -> bool:
+    return bool(load(name)[0].plant.wheels.axes)
 
 
 class _Conformance(test_utils.EnvironmentTestMixin):
@@ -86,13 +91,19 @@ class TestDivergence(_Conformance, TestCase):
             yield np.full(3, np.nan if index % 7 == 3 else 1e9)
 
 
-@pytest.mark.parametrize("scenario", scenario_names())
-def test_every_scenario_is_an_environment(scenario: str) -> None:
+@pytest.mark.parametrize("scenario", [name for name in scenario_names() if wheeled(name)])
+def test_every_scenario_with_reaction_wheels_is_an_environment(scenario: str) -> None:
     environment = environments.load(scenario)
     environment.reset()
     step = environment.step(np.zeros(3))
     assert step.mid()
     assert 0.0 < step.reward <= 1.0
+
+
+@pytest.mark.parametrize("scenario", ["dgvscmg-tracking", "pd-plus"])
+def test_other_motors_make_no_environment(scenario: str) -> None:
+    with pytest.raises(InputError, match="a torque for reaction wheels"):
+        environments.load(scenario)
 
 
 def seen(step: TimeStep) -> tuple[Measurement, Reference]:
