@@ -133,7 +133,7 @@ def _integrator(model: Any) -> Iterator[str]:
         yield (
             f"the integrator is {name}, first order: with a wheel of 6 N m s it puts the bus rate "
             f"10 % off within 100 s at a step of 10 ms, 1 % at 1 ms, where RK4 errs by 1e-11 and "
-            f'less (measured); set rates.integrator = "RK4"'
+            f'less (measured); set integrator="RK4" (rates.integrator in a scenario)'
         )
 
 

@@ -119,9 +119,10 @@ class _Flight:
             bus = assembly.vehicle.model.body("bus").id
             applied = self.batch.bind("xfrc_applied")[:, bus]
             self.push = HeldDisturbance(assembly.disturbance, applied)
-        self.quick = self.inner is not None or self.actuators.stateful
-        self.stepwise = self.quick or self.push is not None
-        self.hold = scenario.rates.physics if self.quick else scenario.rates.control
+        self.driven_stepwise = self.inner is not None or self.actuators.stateful
+        self.stepwise = self.driven_stepwise or self.push is not None
+        rates = scenario.rates
+        self.hold = rates.physics if self.driven_stepwise else rates.control
         self.steps = scenario.rates.steps
         self.tick = math.gcd(self.steps, *self.suite.ticks)
         recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
@@ -231,14 +232,12 @@ class _Flight:
         step, physics_step = 1, self.assembly.scenario.rates.physics
         while step < self.steps:
             if self.stepwise or step % self.tick == 0:
-                now, truth = (
-                    (first_step + step) * physics_step,
-                    self._truth(self.batch.state.copy()),
-                )
+                now = (first_step + step) * physics_step
+                truth = self._truth(self.batch.state.copy())
                 self.sensors, seen = self.suite.sample(self.sensors, first_step + step, truth)
                 if self.push is not None:
                     self.push(now, truth)
-                if self.quick:
+                if self.driven_stepwise:
                     self._drive(now, command, seen, truth)
             count = 1 if self.stepwise else self.tick - step % self.tick
             self.batch.step(nstep=count)

@@ -38,8 +38,9 @@ def test_help_and_list() -> None:
     assert "replay" in mjspace("--help").stdout
     listed = json.loads(mjspace("list", "--json").stdout)
     assert "contraction-adaptive" in listed
+    lines = mjspace("list").stdout
     for name, description in listed.items():
-        assert f"{name} " in mjspace("list").stdout
+        assert f"{name} " in lines
         assert description
 
 
