@@ -7,7 +7,7 @@ run: .venv/run.done
 	$(bin)/mjspace run contraction-adaptive --plot --video
 
 test: .venv/dev.done
-	$(bin)/python -m pytest -n auto --dist loadfile
+	$(bin)/python -m pytest
 
 lint: .venv/dev.done
 	$(bin)/ruff check
