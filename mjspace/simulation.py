@@ -160,7 +160,6 @@ class _Flight:
         tape.physics.append(physics)
         tape.sensors.append(self.sensors)
         tape.actuators.append(self.actuator_state)
-        tape.truth.append(truth)
         self.sensors, measurement = self.suite.sample(self.sensors, period * self.steps, truth)
         before, command, signals = self._ask_law(now, measurement, reference)
         motor, saturated = self._drive(now, command, measurement, truth)

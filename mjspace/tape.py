@@ -99,7 +99,6 @@ class Tape:
     reference: Reference
     """Arrays of at least as many rows as will be recorded, without a vehicle axis."""
     physics: list[Array] = field(default_factory=list)
-    truth: list[Measurement] = field(default_factory=list)
     actuators: list[dict[str, Array]] = field(default_factory=list)
     sensors: list[dict[str, Array]] = field(default_factory=list)
     law: list[Any] = field(default_factory=list)
@@ -121,12 +120,12 @@ class Tape:
         physics = np.array(self.physics[:n])
         data = np.array(self.sensordata)
         reference = {name: a[:n, None] for name, a in self.reference._asdict().items()}
-        truth = _fields(self.truth[:n])
-        state = {"physics": physics}
-        state |= {
-            f"actuator_{name}": np.array([s[name] for s in self.actuators[:n]])
-            for name in self.actuators[0]
+        actuators = {
+            name: np.array([s[name] for s in self.actuators[:n]]) for name in self.actuators[0]
         }
+        truth = assembly.actuators.seen(actuators, columns.truth(physics))
+        state = {"physics": physics}
+        state |= {f"actuator_{name}": a for name, a in actuators.items()}
         state |= {f"law_{name}": a for name, a in _fields(self.law[:n]).items()}
         state |= {
             f"sensor_{name}": np.array([s[name] for s in self.sensors[:n]])
@@ -138,12 +137,12 @@ class Tape:
         rows: Rows = {
             "/state": state,
             "/truth": {
-                **truth,
+                **_without_empty(truth._asdict()),
                 "position": physics[..., columns.position],
                 "velocity": physics[..., columns.velocity],
                 "momentum": data[..., vehicle.momentum],
                 "energy": data[..., vehicle.kinetic],
-                "attitude_error": attitude.rotation_angle(truth["attitude"], reference["attitude"])[
+                "attitude_error": attitude.rotation_angle(truth.attitude, reference["attitude"])[
                     ..., None
                 ],
             },
@@ -190,6 +189,11 @@ def _fields(tuples: list[Any]) -> dict[str, Array]:
             f"a law's state, command and signals are named tuples of arrays of constant shape; "
             f"{type(tuples[0]).__name__} is not: {error}"
         ) from error
+    return _without_empty(fields)
+
+
+def _without_empty(fields: dict[str, Array]) -> dict[str, Array]:
+    """Return the fields that have numbers: a vehicle may lack a kind of sensor or motor."""
     return {name: array for name, array in fields.items() if array.size}
 
 
