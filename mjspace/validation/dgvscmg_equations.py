@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.validation.kinematics import quaternion_slope
 
 NONE = np.zeros(3)
 NONE.setflags(write=False)
@@ -103,14 +104,7 @@ def simplified(vehicle: Vehicle, y: Array, eta: Array, outside: Array = NONE) ->
 
 def derivative(y: Array, acceleration: Array) -> Array:
     """Return y' (13,) for accelerations (6,), of the bus and relative."""
-    q0, q1, q2, q3 = (0.5 * y[:4]).tolist()
-    w1, w2, w3 = y[7:10].tolist()
-    turn = [
-        -q1 * w1 - q2 * w2 - q3 * w3,
-        q0 * w1 + q2 * w3 - q3 * w2,
-        q0 * w2 + q3 * w1 - q1 * w3,
-        q0 * w3 + q1 * w2 - q2 * w1,
-    ]
+    turn = quaternion_slope(*y[:4].tolist(), *y[7:10].tolist())
     return np.concatenate([turn, y[10:], acceleration])
 
 

@@ -20,6 +20,7 @@ from mjspace.validation.benchmark import (
     Picture,
     Readings,
 )
+from mjspace.validation.kinematics import quaternion_slope
 from mjspace.validation.magnetorquers import b_dot, b_dot_in_orbit
 
 PERIOD = 5800.0  # s: a circular orbit at 599 km
@@ -84,10 +85,7 @@ def exact_tumble(time: Array) -> Array:
         fz = bz + 2.0 * (b * py - c * px)
         along, square = x * fx + y * fy + z * fz, fx * fx + fy * fy + fz * fz
         return [
-            0.5 * (-b * x - c * y - d * z),
-            0.5 * (a * x + c * z - d * y),
-            0.5 * (a * y + d * x - b * z),
-            0.5 * (a * z + b * y - c * x),
+            *quaternion_slope(a, b, c, d, x, y, z),
             # k (w x B) x B = k ((w B) B - B^2 w)
             (STRONG * (along * fx - square * x) - (I3 - I2) * y * z) / I1,
             (STRONG * (along * fy - square * y) - (I1 - I3) * z * x) / I2,

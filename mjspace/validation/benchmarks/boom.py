@@ -17,6 +17,7 @@ from mjspace.validation.benchmark import (
     Picture,
     Readings,
 )
+from mjspace.validation.kinematics import quaternion_slope
 
 INERTIA = np.array([8.0, 9.0, 10.0])  # kg m^2: the bus with the tips' own, not their distance
 TIP = 2.0  # kg, each of two
@@ -66,10 +67,7 @@ def exact_nutation(time: Array) -> tuple[Array, Array]:
             (B - C) * y * z / A,
             ((C - A) * z * x - grows * y) / B,
             ((A - B) * x * y - grows * z) / C,
-            0.5 * (-q1 * x - q2 * y - q3 * z),
-            0.5 * (q0 * x + q2 * z - q3 * y),
-            0.5 * (q0 * y + q3 * x - q1 * z),
-            0.5 * (q0 * z + q1 * y - q2 * x),
+            *quaternion_slope(q0, q1, q2, q3, x, y, z),
         ]
 
     begin = [*NUTATION, 1.0, 0.0, 0.0, 0.0]

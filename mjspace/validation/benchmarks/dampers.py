@@ -20,6 +20,7 @@ from mjspace.validation.benchmark import (
     Picture,
     Readings,
 )
+from mjspace.validation.kinematics import quaternion_slope
 
 Vector = tuple[float, float, float]
 
@@ -134,14 +135,8 @@ def exact(case: Tube | Ring) -> tuple[Array, Array]:
 
     def slope(_: float, state: Array) -> tuple[float, ...]:
         a, b, c, d, *internal = state.tolist()
-        (w1, w2, w3), change = case.motion(in_body(a, b, c, d), *internal)
-        return (
-            0.5 * (-b * w1 - c * w2 - d * w3),
-            0.5 * (a * w1 + c * w3 - d * w2),
-            0.5 * (a * w2 + d * w1 - b * w3),
-            0.5 * (a * w3 + b * w2 - c * w1),
-            *change,
-        )
+        rate, change = case.motion(in_body(a, b, c, d), *internal)
+        return *quaternion_slope(a, b, c, d, *rate), *change
 
     start = (1.0, 0.0, 0.0, 0.0, *case.internal)
     states = solve_ivp(slope, TIME[[0, -1]], start, "DOP853", TIME, rtol=1e-13, atol=1e-15).y.T

@@ -21,6 +21,7 @@ from mjspace.validation.benchmark import (
     Picture,
     Readings,
 )
+from mjspace.validation.kinematics import quaternion_slope
 
 ORBIT_PERIOD = 5700.0  # s: a circular orbit at 518 km
 RATE = 2.0 * np.pi / ORBIT_PERIOD  # rad/s
@@ -87,10 +88,7 @@ def exact_libration(release: Array, time: Array) -> Array:
         w1, w2, w3 = x - n * p1, y - n * p2, z - n * p3
         k = 3 * n * n
         return [
-            0.5 * (-b * x - c * y - d * z),
-            0.5 * (a * x + c * z - d * y),
-            0.5 * (a * y + d * x - b * z),
-            0.5 * (a * z + b * y - c * x),
+            *quaternion_slope(a, b, c, d, x, y, z),
             # the rate of LVLH, constant there, turns in body axes: p' = p x (x, y, z)
             (I3 - I2) * (k * u2 * u3 - w2 * w3) / I1 + n * (p2 * z - p3 * y),
             (I1 - I3) * (k * u3 * u1 - w3 * w1) / I2 + n * (p3 * x - p1 * z),

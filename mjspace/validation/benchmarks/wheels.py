@@ -15,6 +15,7 @@ from mjspace.validation.benchmark import (
     Picture,
     Readings,
 )
+from mjspace.validation.kinematics import quaternion_slope
 
 AXIAL = 0.01  # kg m^2, of the wheel, about z
 BUS = np.array([10.006, 12.006, 14.0])  # kg m^2, with the wheel's transverse inertia of 0.006
@@ -47,10 +48,7 @@ def exact_gyrostat(time: Array) -> tuple[Array, Array]:
         q0, q1, q2, q3, w1, w2, w3 = y.tolist()
         p1, p2, p3 = BUS[0] * w1, BUS[1] * w2, BUS[2] * w3 + h
         return (
-            0.5 * (-q1 * w1 - q2 * w2 - q3 * w3),
-            0.5 * (q0 * w1 + q2 * w3 - q3 * w2),
-            0.5 * (q0 * w2 + q3 * w1 - q1 * w3),
-            0.5 * (q0 * w3 + q1 * w2 - q2 * w1),
+            *quaternion_slope(q0, q1, q2, q3, w1, w2, w3),
             (p2 * w3 - p3 * w2) / BUS[0],
             (p3 * w1 - p1 * w3) / BUS[1],
             (p1 * w2 - p2 * w1) / BUS[2],
