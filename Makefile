@@ -7,7 +7,7 @@ run: .venv/run.done
 	$(bin)/mjspace run contraction-adaptive --plot --video
 
 test: .venv/dev.done
-	$(bin)/python -m pytest
+	$(bin)/python -m pytest -n 2 --dist loadfile
 
 lint: .venv/dev.done
 	$(bin)/ruff check
