@@ -12,7 +12,8 @@ Array = NDArray[np.float64]
 class Measurement(NamedTuple):
     """What the sensors report at a control instant; a leading vehicle axis may precede each shape.
 
-    A vehicle without wheels has ``wheel_speed`` of shape ``(0,)``.
+    A vehicle without wheels has ``wheel_speed`` of shape ``(0,)``, and so it is with every sensor
+    that a scenario may leave out.
     """
 
     attitude: Array
@@ -27,6 +28,17 @@ class Measurement(NamedTuple):
     """Gimbal rates relative to what carries them [rad/s], shape (..., g)."""
     current: Array = np.zeros(0)
     """(I_d, I_q) of each motor that has an electrical side [A], shape (..., m, 2)."""
+    position: Array = np.zeros(0)
+    """Of the bus, inertial axes [m], shape (..., 3)."""
+    velocity: Array = np.zeros(0)
+    """Of the bus, inertial axes [m/s], shape (..., 3)."""
+    specific_force: Array = np.zeros(0)
+    """What an accelerometer at the bus's origin feels, body axes [m/s^2], shape (..., 3): the mean
+    since its last sample."""
+    altitude: Array = np.zeros(0)
+    """Height of the bus above the plane z = 0 [m], shape (..., 1)."""
+    ground_velocity: Array = np.zeros(0)
+    """What a velocimeter shows: of the bus, body axes [m/s], shape (..., 3)."""
 
 
 class Reference(NamedTuple):
@@ -38,6 +50,27 @@ class Reference(NamedTuple):
     """Angular velocity of the desired axes, in the desired axes [rad/s], shape (..., 3)."""
     acceleration: Array
     """Time derivative of the components of ``rate`` [rad/s^2], shape (..., 3)."""
+
+
+class Trajectory(NamedTuple):
+    """A ``Reference`` that says where the vehicle shall be as well."""
+
+    attitude: Array
+    """Quaternion, scalar first, desired body axes to inertial, shape (..., 4)."""
+    rate: Array
+    """Angular velocity of the desired axes, in the desired axes [rad/s], shape (..., 3)."""
+    acceleration: Array
+    """Time derivative of the components of ``rate`` [rad/s^2], shape (..., 3)."""
+    position: Array
+    """Inertial axes [m], shape (..., 3)."""
+    velocity: Array
+    """Inertial axes [m/s], shape (..., 3)."""
+    linear_acceleration: Array
+    """Inertial axes [m/s^2], shape (..., 3)."""
+
+
+Wanted = Reference | Trajectory
+"""What a law is told to follow."""
 
 
 class TorqueCommand(NamedTuple):
@@ -54,6 +87,15 @@ class VoltageCommand(NamedTuple):
     """(u_d, u_q) of each motor, in the rotor's axes [V], shape (..., m, 2)."""
 
 
+class ThrustCommand(NamedTuple):
+    """What a law asks of an engine on two gimbals."""
+
+    thrust: Array
+    """[N], shape (..., 1)."""
+    gimbal: Array
+    """Angles of the hinges, the outer before the inner [rad], shape (..., 2)."""
+
+
 class Law(Protocol):
     """A control law: gains in, two pure functions, no hidden state.
 
@@ -61,18 +103,19 @@ class Law(Protocol):
     those of the measurement; they are logged under their field names, so their shapes never change
     during a flight. A law that says ``batched = True`` handles any leading axes; another sees the
     arrays of one vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any
-    command with that field; motors with an electrical side a ``VoltageCommand``.
+    command with that field; motors with an electrical side a ``VoltageCommand``; an engine on
+    gimbals a ``ThrustCommand``. ``reference`` is what the scenario's reference says: ``Wanted``.
 
     A batched law may have an inner loop as well, for what must be quick: a method
     ``inner(state, time, command, measurement) -> (state, command)``, pure like ``step``, that is
     called every integration step and turns the command of ``step`` into that of the motors.
     """
 
-    def reset(self, measurement: Measurement, reference: Reference) -> Any:
+    def reset(self, measurement: Measurement, reference: Any) -> Any:
         """Return the law's state at the start of a flight."""
 
     def step(
-        self, state: Any, time: float, measurement: Measurement, reference: Reference
+        self, state: Any, time: float, measurement: Measurement, reference: Any
     ) -> tuple[Any, Any, Any]:
         """Return (state, command, signals) for the control period that starts at ``time`` [s]."""
 
@@ -80,8 +123,12 @@ class Law(Protocol):
 class ReferenceSource(Protocol):
     """A wanted motion as a pure function of time."""
 
-    def at(self, time: Array) -> Reference:
-        """Return the reference at each ``time`` [s], shape (n,), as arrays with n rows."""
+    def at(self, time: Array) -> Wanted:
+        """Return the reference at each ``time`` [s], shape (n,), as arrays with n rows.
+
+        Any named tuple would do that begins with the fields of ``Reference``: the law is given what
+        it says, and the log shows it.
+        """
 
 
 def gain(unit: str = "", shape: tuple[int | None, ...] = (), default: Any = MISSING) -> Any:

@@ -18,7 +18,7 @@ from dm_env.specs import BoundedArray
 from mjspace import attitude, dm_bridge, environment, loading
 from mjspace.actuators import ReactionWheels
 from mjspace.assembly import Assembly, assemble
-from mjspace.contract import Array, Measurement, Reference
+from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import InputError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.simulation import BLOCK_PERIODS, INTEGRATION, first_start, last_period
@@ -152,11 +152,11 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
         ]
 
         @lru_cache(maxsize=1)
-        def block(number: int) -> Reference:
+        def block(number: int) -> Wanted:
             first = number * BLOCK_PERIODS
             end = min(first + BLOCK_PERIODS, self._last + 1)
             times = np.arange(first, end, dtype=np.float64) * self._control
-            return Reference(*assembly.reference.at(times))
+            return assembly.reference.at(times)
 
         self._block = block
 
@@ -213,6 +213,7 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
             return 0.0
         return 1.0 if physics.period() >= self._last else None
 
-    def _reference(self, physics: Physics) -> Reference:
+    def _reference(self, physics: Physics) -> Wanted:
         number, row = divmod(physics.period(), BLOCK_PERIODS)
-        return Reference(*(values[row] for values in self._block(number)))
+        block = self._block(number)
+        return type(block)(*(values[row] for values in block))

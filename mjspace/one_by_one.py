@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.contract import Law, Measurement, Reference
+from mjspace.contract import Law, Measurement, Wanted
 
 
 class OneByOne:
@@ -13,12 +13,12 @@ class OneByOne:
     def __init__(self, law: Law) -> None:
         self._law = law
 
-    def reset(self, measurement: Measurement, reference: Reference) -> Any:
+    def reset(self, measurement: Measurement, reference: Wanted) -> Any:
         """Return the law's state with a vehicle axis."""
         return _stack([self._law.reset(one, reference) for one in _vehicles(measurement)])
 
     def step(
-        self, state: Any, time: float, measurement: Measurement, reference: Reference
+        self, state: Any, time: float, measurement: Measurement, reference: Wanted
     ) -> tuple[Any, Any, Any]:
         """Return the law's state, command and signals with a vehicle axis."""
         states = _vehicles(state) if state else [state] * len(measurement.rate)

@@ -12,7 +12,7 @@ import numpy as np
 
 from mjspace import plant
 from mjspace.assembly import Assembly, assemble
-from mjspace.contract import Measurement, Reference
+from mjspace.contract import Measurement
 from mjspace.errors import InputError, blamed_on
 from mjspace.flight import Progress, Result, fly_to_log
 from mjspace.flown import scenario_of
@@ -143,10 +143,11 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     )
     law_state: Any = None
     if not fresh_law:
-        seen, wanted = log.read("/measurement", None, *near), log.read("/reference", None, *near)
+        seen = log.read("/measurement", None, *near)
+        wanted = assembly.reference.at(np.array([number * period]))
         template = assembly.law.reset(
             Measurement(**{n: seen.get(n, np.zeros((1, 0))) for n in Measurement._fields}),
-            Reference(*(wanted[name][0] for name in Reference._fields)),
+            type(wanted)(*(values[0] for values in wanted)),
         )
         names = getattr(template, "_fields", ())
         missing = [name for name in names if f"law_{name}" not in state]

@@ -12,7 +12,7 @@ from mujoco.batch import Batch, SimulationError
 
 from mjspace import environment, mujoco_log
 from mjspace.assembly import Assembly
-from mjspace.contract import Array, Measurement, Reference
+from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.scenario import Scenario
@@ -139,8 +139,9 @@ class _Flight:
         try:
             # A law's infinities are found in what it commands, not in NumPy's warnings.
             with np.errstate(all="ignore"):
-                for period, reference in enumerate(map(Reference, *wanted), first):
-                    now = period * control
+                rows: Any = zip(*wanted, strict=True)
+                for period, row in enumerate(rows, first):
+                    now, reference = period * control, type(wanted)(*row)
                     self._fly_period(tape, period, now, reference, flown=period < last)
                     if stop() or clock.monotonic() > due:
                         break
@@ -153,7 +154,7 @@ class _Flight:
         return tape, ""
 
     def _fly_period(
-        self, tape: Tape, period: int, now: float, reference: Reference, *, flown: bool
+        self, tape: Tape, period: int, now: float, reference: Wanted, *, flown: bool
     ) -> None:
         physics = self.batch.state.copy()
         truth = self._truth(physics)
@@ -181,7 +182,7 @@ class _Flight:
             self._rest_of_period(period * self.steps, command)
 
     def _ask_law(
-        self, now: float, measurement: Measurement, reference: Reference
+        self, now: float, measurement: Measurement, reference: Wanted
     ) -> tuple[Any, Any, Any]:
         """Return the law's state before its step, its command and its signals."""
         law = self.assembly.law

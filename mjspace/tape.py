@@ -9,7 +9,7 @@ import numpy as np
 
 from mjspace import attitude
 from mjspace.assembly import Assembly
-from mjspace.contract import Array, Measurement, Reference
+from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import FlightError
 
 Rows = dict[str, dict[str, Array]]
@@ -63,7 +63,7 @@ class Columns:
             physics[..., self.wheel_speed],
             physics[..., self.gimbal_angle],
             physics[..., self.gimbal_rate],
-            physics[..., :0],
+            *[physics[..., :0]] * 6,
         )
 
 
@@ -96,7 +96,7 @@ class Tape:
     """One list entry for each control period of a block; arrays have a vehicle axis."""
 
     period: int
-    reference: Reference
+    reference: Wanted
     """Arrays of at least as many rows as will be recorded, without a vehicle axis."""
     physics: list[Array] = field(default_factory=list)
     actuators: list[dict[str, Array]] = field(default_factory=list)

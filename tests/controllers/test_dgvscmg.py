@@ -30,7 +30,7 @@ def seen(vehicles: int, seed: int = 0) -> Measurement:
 
 
 def one(arrays: Any, index: int) -> Any:
-    return type(arrays)(*(a[index] for a in arrays))
+    return type(arrays)(*(a[index] if a.size else a for a in arrays))
 
 
 def flown(law: Cascade, measurement: Measurement) -> tuple[State, Any, Any, Any]:
