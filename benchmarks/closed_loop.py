@@ -18,7 +18,8 @@ from mujoco.batch import Batch
 from mjspace.assembly import Assembly, assemble
 from mjspace.flight import fly_to_log
 from mjspace.loading import load
-from mjspace.simulation import first_start, fly
+from mjspace.simulation import fly
+from mjspace.start import first_start
 
 ROUNDS = 5
 

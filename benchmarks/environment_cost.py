@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 
 from mjspace import environment, plant
-from mjspace.tables import DisturbanceTorque, Environment, Orbit, PlantTable, Rates, Sine
+from mjspace.environment_tables import DisturbanceTorque, Environment, Orbit, Sine
+from mjspace.tables import PlantTable, Rates
 
 ORBIT = Orbit(semi_major_axis=7.0e6, eccentricity=0.01, inclination=0.9)
 TORQUE = DisturbanceTorque(

@@ -14,7 +14,11 @@ State = dict[str, Array]
 
 
 class Actuators(Protocol):
-    """The motors of a batch of vehicles: all memory in ``State``."""
+    """The motors of a batch of vehicles: all memory in ``State``.
+
+    Actuators that burn what they carry have a method ``masses(state)`` as well: for each field of
+    MuJoCo's model that has changed, the body and the vehicles' values, (N, ...).
+    """
 
     logged_as: ClassVar[str]
     """The field of /command that their torques are logged under."""

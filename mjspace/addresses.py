@@ -4,11 +4,17 @@ import re
 from collections.abc import Collection, Iterable
 from typing import Any
 
+import mujoco
 import numpy as np
 
+ENGINE = ("engine_outer", "engine_inner", "engine_thrust")
+"""The motors of an engine on gimbals, in the order of ``ctrl``."""
 
-def of(model: Any, wheels: int, driven: Collection[str]) -> dict[str, Any]:
+
+def of(model: Any, wheels: int, driven: Collection[str], *, engine: bool = False) -> dict[str, Any]:
     """Return ``plant.Vehicle``'s fields for that many reaction wheels, and ``driven`` hinges.
+
+    With an ``engine``, its gimbals are gimbals, and its thrust is a motor.
 
     Raises:
         ValueError: no motor turns one of the hinges, or a motor is left without its drive.
@@ -16,6 +22,9 @@ def of(model: Any, wheels: int, driven: Collection[str]) -> dict[str, Any]:
     """
     reaction_wheels = [f"wheel_{index}" for index in range(wheels)]
     drives = _by_motor(model, driven)
+    motors = [*reaction_wheels, *drives]
+    if engine:
+        motors, drives = _engine(model), list(ENGINE[:2])
     gimbals = [name for name in drives if not name.endswith("wheel")]
     spun = [*reaction_wheels, *(name for name in drives if name not in gimbals)]
     return {
@@ -23,14 +32,16 @@ def of(model: Any, wheels: int, driven: Collection[str]) -> dict[str, Any]:
         "gimbal_dof": _where(model.joint(name).dofadr for name in gimbals),
         "gimbal_qpos": _where(model.joint(name).qposadr for name in gimbals),
         "drive_dof": _where(model.joint(name).dofadr for name in drives),
-        "motors": (*reaction_wheels, *drives),
+        "motors": tuple(motors),
+        "strut_qpos": _where(joint.qposadr for joint in _struts(model)),
         **{name: _sensor(model, name) for name in ("momentum", "kinetic", "environment")},
     }
 
 
 def _by_motor(model: Any, driven: Collection[str]) -> list[str]:
     """Return the ``driven`` hinges in the order of their motors in ``ctrl``."""
-    turned = [model.joint(model.actuator_trnid[i, 0]).name for i in range(model.nu)]
+    on_joints = np.flatnonzero(model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
+    turned = [model.joint(model.actuator_trnid[i, 0]).name for i in on_joints]
     parts = [name for name in turned if not re.fullmatch(r"wheel_\d+", name)]
     for name in driven:
         if name not in parts:
@@ -38,6 +49,22 @@ def _by_motor(model: Any, driven: Collection[str]) -> list[str]:
     if left := set(parts).difference(driven) if driven else ():
         raise ValueError(f"plant.drives: {', '.join(sorted(left))} has a motor and no drive")
     return parts if driven else []
+
+
+def _engine(model: Any) -> list[str]:
+    """Return the engine's motors; they must be all that there are."""
+    motors = [model.actuator(i).name for i in range(model.nu)]
+    if motors != list(ENGINE):
+        raise ValueError(
+            f"plant.engine: wants the motors {', '.join(ENGINE)}, as plant.model = 'lander' has "
+            f"them; here they are {', '.join(motors) or 'none'}"
+        )
+    return motors
+
+
+def _struts(model: Any) -> list[Any]:
+    joints = [model.joint(i) for i in range(model.njnt)]
+    return [joint for joint in joints if joint.name.endswith("_strut")]
 
 
 def _where(addresses: Iterable[Any]) -> Any:

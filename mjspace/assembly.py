@@ -6,10 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mjspace import environment, plant
+import numpy as np
+
+from mjspace import central_gravity, environment, plant
 from mjspace.actuators import Actuators, IdealThrusters, ReactionWheels
 from mjspace.components import construct, load_object, source_of
 from mjspace.contract import Array, Law, ReferenceSource
+from mjspace.engine import GimballedEngine
 from mjspace.errors import blamed_on
 from mjspace.motor_drives import MotorDrives
 from mjspace.one_by_one import OneByOne
@@ -49,7 +52,15 @@ class Assembly:
             scenario.seed,
             members,
             wheels=len(self.vehicle.wheel_dof),
+            gravity=self._gravity,
         )
+
+    def _gravity(self, position: Array) -> Array:
+        """Return the central gravity [m/s^2] at ``position`` [m], both (..., 3)."""
+        table = self.scenario.environment.gravity
+        if table is None:
+            return np.zeros_like(position)
+        return central_gravity.acceleration(central_gravity.pack(table), position)
 
 
 def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None) -> Assembly:
@@ -131,6 +142,8 @@ def _actuators(vehicle: Vehicle, table: PlantTable) -> Actuators:
         return MotorDrives.of(vehicle, [table.drives[name] for name in vehicle.motors])
     if table.ideal_thrusters:
         return IdealThrusters()
+    if table.engine is not None:
+        return GimballedEngine.of(vehicle, table.engine)
     return ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit)
 
 

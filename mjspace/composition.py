@@ -9,6 +9,7 @@ import numpy as np
 
 from mjspace import mass
 from mjspace.contract import Array
+from mjspace.landing_tables import Ground
 from mjspace.tables import Part, PlantTable
 
 _ASSETS = Path(str(files("mjspace.assets")))
@@ -26,6 +27,8 @@ def compose(table: PlantTable) -> Any:
         _attach_wheel(spec, table, index)
     for name, part in table.parts.items():
         _attach_part(spec, name, part)
+    if table.ground is not None:
+        _attach_ground(spec, table.ground)
     if spec.equalities:
         # A model of free bodies does without; a cord that unwinds does not.
         spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -79,6 +82,18 @@ def _attach_part(spec: Any, name: str, part: Part) -> None:
     mount = spec.body("bus").add_frame(pos=part.position)
     mujoco.mju_euler2Quat(mount.quat, np.array(part.euler), "XYZ")  # about fixed axes
     spec.attach(child, prefix=f"{name}_", frame=mount)
+
+
+def _attach_ground(spec: Any, ground: Ground) -> None:
+    """Lay the ground through the origin, sloping down towards ``downhill``."""
+    file = _ASSETS / f"parts/{ground.part}/{ground.part}.xml"
+    if not file.is_file():
+        known = ", ".join(sorted(path.parent.name for path in _ASSETS.glob("parts/moon_*/*.xml")))
+        raise ValueError(f"plant.ground.part: no part {ground.part!r}: have {known}")
+    across = [-np.sin(ground.downhill), np.cos(ground.downhill), 0.0]
+    frame = spec.worldbody.add_frame()
+    mujoco.mju_axisAngle2Quat(frame.quat, np.array(across), ground.slope)
+    spec.attach(mujoco.MjSpec.from_file(str(file)), prefix="", frame=frame)
 
 
 def _exit(half_size: Array, axis: Array) -> float:

@@ -9,3 +9,5 @@ RADIUS = {  # [m]
     "earth": 6378136.6,  # equatorial; IERS Conventions (2010), Technical Note 36, table 1.1
     "moon": 1737400.0,  # mean; Archinal et al. 2018, IAU WGCCRE report 2015, table 5
 }
+
+STANDARD_GRAVITY = 9.80665  # m/s^2; CGPM 1901, resolution 2: for specific impulse

@@ -39,6 +39,12 @@ class Measurement(NamedTuple):
     """Height of the bus above the plane z = 0 [m], shape (..., 1)."""
     ground_velocity: Array = np.zeros(0)
     """What a velocimeter shows: of the bus, body axes [m/s], shape (..., 3)."""
+    thrust: Array = np.zeros(0)
+    """Of the engine [N], shape (..., 1)."""
+    propellant: Array = np.zeros(0)
+    """Left in the tank [kg], shape (..., 1)."""
+    contact: Array = np.zeros(0)
+    """1.0 while at least two feet stand on the ground, else 0.0, shape (..., 1)."""
 
 
 class Reference(NamedTuple):

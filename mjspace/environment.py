@@ -12,10 +12,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mjspace import central_gravity, kepler, struct_offsets
 from mjspace import environment_kernel as kernel
-from mjspace import kepler, struct_offsets
 from mjspace.contract import Array
-from mjspace.tables import DisturbanceTorque, Environment, Orbit, Ripple
+from mjspace.environment_tables import DisturbanceTorque, Environment, Orbit
+from mjspace.tables import Ripple
 
 SENSOR = "environment"
 """Name of the user sensor (6 numbers, needstage "vel") that is given the environment's total on the
@@ -109,6 +110,8 @@ def _blocks(
     blocks = []
     if environment.orbit is not None:
         blocks.append(_block(kernel.ORBIT, kepler.pack(environment.orbit)))
+    if environment.gravity is not None:
+        blocks.append(_block(kernel.GRAVITY, central_gravity.pack(environment.gravity)))
     for torque in environment.torques:
         kind = kernel.BODY_TORQUE if torque.frame == "body" else kernel.INERTIAL_TORQUE
         blocks.append(_block(kind, _pack_torque(torque)))

@@ -25,7 +25,7 @@ from mjspace.struct_offsets import DataOffsets, ModelOffsets
 
 MAGIC = 6.02214076e23
 HEADER = 4
-ORBIT, BODY_TORQUE, INERTIAL_TORQUE, FRICTION, RIPPLE = 1.0, 2.0, 3.0, 4.0, 5.0
+ORBIT, BODY_TORQUE, INERTIAL_TORQUE, FRICTION, RIPPLE, GRAVITY = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 
 _STAGE_VELOCITY = 2  # mjSTAGE_VEL: passive forces are known from it on
 
@@ -70,6 +70,8 @@ def add_forces(userdata: Any, time: float, vehicle: Vehicle) -> None:
             friction(payload, vehicle)
         elif kind == RIPPLE:
             ripple(payload, vehicle)
+        elif kind == GRAVITY:
+            central(payload, vehicle)
         block = end
 
 
@@ -97,21 +99,49 @@ def tidal(orbit: Any, time: float, vehicle: Vehicle) -> None:
         shrink = -q * (3.0 + q * (3.0 + q)) / (ratio3 * (1.0 + ratio3))
         scale = -mass * rate2
         force = (scale * (dx + shrink * x), scale * (dy + shrink * y), scale * (dz + shrink * z))
-        # the columns of ximat are the principal axes
-        m, inertia = vehicle.ximat[body], vehicle.body_inertia[body]
-        a = m[0] * x + m[3] * y + m[6] * z
-        b = m[1] * x + m[4] * y + m[7] * z
-        c = m[2] * x + m[5] * y + m[8] * z
         factor = 3.0 * rate2 / (ratio3 * (1.0 + q) * radius2)
-        ta = factor * (inertia[2] - inertia[1]) * b * c
-        tb = factor * (inertia[0] - inertia[2]) * c * a
-        tc = factor * (inertia[1] - inertia[0]) * a * b
-        torque = (
-            m[0] * ta + m[1] * tb + m[2] * tc,
-            m[3] * ta + m[4] * tb + m[5] * tc,
-            m[6] * ta + m[7] * tb + m[8] * tc,
-        )
+        add_wrench(vehicle, body, force, gradient_torque(vehicle, body, x, y, z, factor))
+
+
+@njit(cache=True, error_model="numpy")
+def central(gravity: Any, vehicle: Vehicle) -> None:
+    """Add a planet's gravity on every body at its own place, with its gradient's torque.
+
+    ``gravity``: the gravitational parameter [m^3/s^2], the origin's distance from the centre [m],
+    from which it is along z.
+    """
+    for body in range(1, vehicle.body_mass.size):
+        mass = vehicle.body_mass[body]
+        if mass == 0.0:
+            continue
+        x, y, z = vehicle.xipos[body]
+        z += gravity[1]
+        radius2 = x * x + y * y + z * z
+        rate2 = gravity[0] / (radius2 * math.sqrt(radius2))
+        scale = -mass * rate2
+        force = (scale * x, scale * y, scale * z)
+        torque = gradient_torque(vehicle, body, x, y, z, 3.0 * rate2 / radius2)
         add_wrench(vehicle, body, force, torque)
+
+
+@njit(cache=True, error_model="numpy")
+def gradient_torque(
+    vehicle: Vehicle, body: int, x: float, y: float, z: float, factor: float
+) -> tuple[float, float, float]:
+    """Return ``factor`` r x I r [N m], world axes, of ``body`` at r = (x, y, z) from the planet."""
+    # the columns of ximat are the principal axes
+    m, inertia = vehicle.ximat[body], vehicle.body_inertia[body]
+    a = m[0] * x + m[3] * y + m[6] * z
+    b = m[1] * x + m[4] * y + m[7] * z
+    c = m[2] * x + m[5] * y + m[8] * z
+    ta = factor * (inertia[2] - inertia[1]) * b * c
+    tb = factor * (inertia[0] - inertia[2]) * c * a
+    tc = factor * (inertia[1] - inertia[0]) * a * b
+    return (
+        m[0] * ta + m[1] * tb + m[2] * tc,
+        m[3] * ta + m[4] * tb + m[5] * tc,
+        m[6] * ta + m[7] * tb + m[8] * tc,
+    )
 
 
 @njit(cache=True, error_model="numpy")

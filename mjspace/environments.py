@@ -21,7 +21,8 @@ from mjspace.assembly import Assembly, assemble
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import InputError
 from mjspace.held_disturbance import HeldDisturbance
-from mjspace.simulation import BLOCK_PERIODS, INTEGRATION, first_start, last_period
+from mjspace.simulation import BLOCK_PERIODS
+from mjspace.start import INTEGRATION, first_start, last_period
 from mjspace.tape import Columns
 
 TOLERATED_ERROR = np.radians(1.0)

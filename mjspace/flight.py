@@ -12,7 +12,8 @@ from mjspace.errors import FlightError
 from mjspace.loading import load
 from mjspace.log_reader import Log
 from mjspace.recorder import Recorder
-from mjspace.simulation import Start, first_start, fly
+from mjspace.simulation import fly
+from mjspace.start import Start, first_start
 from mjspace.stopping import on_signals
 from mjspace.tape import shapes
 

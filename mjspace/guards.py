@@ -139,8 +139,11 @@ def _integrator(model: Any) -> Iterator[str]:
 
 def _collisions(model: Any) -> Iterator[str]:
     off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    colliding = np.count_nonzero(model.geom_contype | model.geom_conaffinity)
-    if _free(model).any() and colliding and not model.opt.disableflags & off:
+    flying = np.isin(model.body_rootid[model.geom_bodyid], model.jnt_bodyid[_free(model)])
+    touch = (model.geom_contype[:, None] & model.geom_conaffinity) != 0
+    apart = model.geom_bodyid[:, None] != model.geom_bodyid
+    colliding = np.count_nonzero(((touch | touch.T) & apart)[flying][:, flying].any(axis=0))
+    if colliding and not model.opt.disableflags & off:
         yield (
             f"contacts are on and {colliding} geoms may collide: a free flyer's own parts would "
             f'touch; set <flag contact="disable"/> or contype="0" conaffinity="0"'

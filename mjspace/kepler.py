@@ -8,7 +8,7 @@ from numba import njit
 
 from mjspace.constants import GM, RADIUS
 from mjspace.contract import Array
-from mjspace.tables import Orbit
+from mjspace.environment_tables import Orbit
 
 
 def pack(orbit: Orbit) -> Array:

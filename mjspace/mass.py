@@ -1,5 +1,6 @@
 """Mass properties: a rotor's inertia, and what the wheels leave of the vehicle's for the bus."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -88,10 +89,40 @@ def bus(table: PlantTable, own: Array) -> tuple[Inertial, Array]:
         inertia = gyrostat - across - offsets
         if np.linalg.eigvalsh(inertia)[0] <= 0.0:
             raise ValueError(_too_much(inertia, gyrostat - offsets, across, wheels))
+    return _inertial(table.mass, centre, inertia), gyrostat
+
+
+def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inertial:
+    """Return the bus that makes a vehicle of mass ``whole`` [kg] with ``others``.
+
+    ``inertia`` (3, 3) [kg m^2] is the vehicle's about the body origin, its centre of mass.
+
+    Raises:
+        ValueError: the others have more mass or inertia than the vehicle.
+    """
+    left = whole - sum(other.mass for other in others)
+    if left <= 0.0:
+        raise ValueError(
+            f"plant.vehicle_mass: {whole:g} kg is less than the parts' {whole - left:.6g} kg"
+        )
+    moment = np.sum([other.mass * other.ipos for other in others], axis=0)
+    centre = -moment / left
+    of_others = [tensor(o.inertia, o.iquat) + o.mass * _point(o.ipos) for o in others]
+    own = inertia - left * _point(centre) - np.sum(of_others, axis=0)
+    if np.linalg.eigvalsh(own)[0] <= 0.0:
+        eigenvalues = np.array2string(np.linalg.eigvalsh(own), precision=4)
+        raise ValueError(
+            f"plant.vehicle_inertia leaves a bus with the eigenvalues {eigenvalues} kg m^2: more "
+            "inertia or less on the parts would do"
+        )
+    return _inertial(left, centre, own)
+
+
+def _inertial(mass: float, centre: Array, inertia: Array) -> Inertial:
     values, principal = np.linalg.eigh(inertia)
     principal[:, 2] = np.cross(principal[:, 0], principal[:, 1])  # right-handed
     quaternion = Rotation.from_matrix(principal).as_quat(scalar_first=True)
-    return Inertial(table.mass, centre, values, quaternion), gyrostat
+    return Inertial(mass, centre, values, quaternion)
 
 
 def tensor(inertia: Array, iquat: Array) -> Array:

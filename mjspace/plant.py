@@ -42,6 +42,8 @@ class Vehicle:
     """Index of each driven gimbal's angle in ``qpos``, shape (g,)."""
     drive_dof: Any
     """Index of each driven hinge's rate in ``qvel``, in the order of its motors, shape (m,)."""
+    strut_qpos: Any
+    """Index of each landing leg's strut in ``qpos``, shape (l,): positive where it is pressed."""
     motors: tuple[str, ...]
     """Names of the hinges that motors turn, in the order of ``ctrl``."""
     torque_limit: float
@@ -73,8 +75,11 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
 
     wheels = table.wheels
     axes = mass.unit_axes(wheels)
-    body = spec.body("bus")
-    inertial, gyrostat = mass.bus(table, _own_inertia(body))
+    if table.vehicle_mass is not None:
+        gyrostat = np.array(table.vehicle_inertia)
+        inertial = mass.remainder(table.vehicle_mass, gyrostat, _others(spec))
+    else:
+        inertial, gyrostat = mass.bus(table, _own_inertia(spec.body("bus")))
     model = _compile(spec, inertial)
     guards.check(model)
 
@@ -85,7 +90,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
         wheel_inertia=addresses.frozen(np.full(len(axes), wheels.inertia)),
         torque_limit=wheels.torque_limit or np.inf,
         speed_limit=wheels.speed_limit or np.inf,
-        **addresses.of(model, len(axes), table.drives),
+        **addresses.of(model, len(axes), table.drives, engine=table.engine is not None),
     )
 
 
@@ -96,8 +101,10 @@ def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
         KeyError: ``model`` lacks one of the vehicle's joints or sensors.
     """
     reaction_wheels = len(vehicle.wheel_axes)
-    driven = vehicle.motors[reaction_wheels:]
-    return replace(vehicle, model=model, **addresses.of(model, reaction_wheels, driven))
+    engine = vehicle.motors == addresses.ENGINE
+    driven = () if engine else vehicle.motors[reaction_wheels:]
+    found = addresses.of(model, reaction_wheels, driven, engine=engine)
+    return replace(vehicle, model=model, **found)
 
 
 def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
@@ -184,6 +191,24 @@ def _compile(spec: Any, inertial: mass.Inertial) -> Any:
         model.body("bus").inertia = moments
         mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
+
+
+def _others(spec: Any) -> list[mass.Inertial]:
+    """Return what else than the bus has mass, in the bus's axes, joints at rest."""
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    bus = model.body("bus").id
+    axes, origin = data.xmat[bus].reshape(3, 3), data.xpos[bus]
+    others = []
+    for body in range(1, model.nbody):
+        if body != bus and model.body_rootid[body] == bus and model.body_mass[body] > 0.0:
+            quat = np.zeros(4)
+            mujoco.mju_mat2Quat(quat, (axes.T @ data.ximat[body].reshape(3, 3)).ravel())
+            place = axes.T @ (data.xipos[body] - origin)
+            moments = model.body_inertia[body].copy()
+            others.append(mass.Inertial(float(model.body_mass[body]), place, moments, quat))
+    return others
 
 
 def _own_inertia(body: Any) -> Array:

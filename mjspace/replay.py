@@ -18,7 +18,8 @@ from mjspace.flight import Progress, Result, fly_to_log
 from mjspace.flown import scenario_of
 from mjspace.log_reader import Log
 from mjspace.scenario import Component
-from mjspace.simulation import Start, fly
+from mjspace.simulation import fly
+from mjspace.start import Start
 from mjspace.tape import one_vehicle
 
 SOURCES = ("law", "reference", "disturbance")

@@ -4,10 +4,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from mjspace.environment_tables import Environment
 from mjspace.fields import Seconds, Table, Time
 from mjspace.quantity import any_to_si, whole_number
 from mjspace.sensor_tables import Sensors
-from mjspace.tables import Environment, Initial, PlantTable, Rates
+from mjspace.tables import Initial, PlantTable, Rates
 
 
 class Component(BaseModel):
@@ -86,12 +87,9 @@ class Scenario(Table):
     @model_validator(mode="after")
     def _whole_periods(self) -> "Scenario":
         step = self.rates.physics
-        spans = {
-            "rates.control": self.rates.control,
-            "sensors.attitude.period": self.sensors.attitude.period,
-            "sensors.rate.period": self.sensors.rate.period,
-            "sensors.wheel_speed.period": self.sensors.wheel_speed.period,
-        }
+        spans: dict[str, float | None] = {"rates.control": self.rates.control}
+        for name, sensor in self.sensors:
+            spans[f"sensors.{name}.period"] = None if sensor is None else sensor.period
         for key, span in spans.items():
             if span is not None:
                 whole_number(span, step, key, "rates.physics")

@@ -40,6 +40,48 @@ class RateSensor(SensorTiming):
     """Size of the least significant digit."""
 
 
+class PlaceSensor(SensorTiming):
+    """Something that shows a length. Ideal by default."""
+
+    noise: Annotated[NonNegative, Si("m")] = 0.0
+    """Standard deviation of the white noise of each sample, on each axis."""
+    bias: Annotated[NonNegative, Si("m")] = 0.0
+    """Standard deviation of the constant bias drawn at the start, on each axis."""
+    bias_walk: Annotated[NonNegative, Si("m")] = 0.0
+    """Standard deviation that the bias's random walk has after one second."""
+    quantization: Annotated[NonNegative, Si("m")] = 0.0
+    """Size of the least significant digit."""
+
+
+class SpeedSensor(SensorTiming):
+    """Something that shows a velocity. Ideal by default."""
+
+    noise: Annotated[NonNegative, Si("m/s")] = 0.0
+    """Standard deviation of the white noise of each sample, on each axis."""
+    bias: Annotated[NonNegative, Si("m/s")] = 0.0
+    """Standard deviation of the constant bias drawn at the start, on each axis."""
+    bias_walk: Annotated[NonNegative, Si("m/s")] = 0.0
+    """Standard deviation that the bias's random walk has after one second."""
+    quantization: Annotated[NonNegative, Si("m/s")] = 0.0
+    """Size of the least significant digit."""
+
+
+class Accelerometer(SensorTiming):
+    """Mean specific force since the last sample. Ideal by default."""
+
+    noise: Annotated[NonNegative, Si("m/s^2")] = 0.0
+    """Standard deviation of the white noise of each sample, on each axis."""
+    bias: Annotated[NonNegative, Si("m/s^2")] = 0.0
+    """Standard deviation of the constant bias drawn at the start, on each axis."""
+    bias_walk: Annotated[NonNegative, Si("m/s^2")] = 0.0
+    """Standard deviation that the bias's random walk has after one second."""
+    quantization: Annotated[NonNegative, Si("m/s^2")] = 0.0
+    """Size of the least significant digit."""
+
+
+Errors = StarTracker | RateSensor | PlaceSensor | SpeedSensor | Accelerometer
+
+
 class Sensors(Table):
     """The vehicle's sensors."""
 
@@ -49,3 +91,13 @@ class Sensors(Table):
     """Gyro."""
     wheel_speed: RateSensor = RateSensor()
     """Wheel tachometers."""
+    position: PlaceSensor | None = None
+    """Where the bus is; no such sensor when left out."""
+    velocity: SpeedSensor | None = None
+    """Velocity of the bus, inertial axes; no such sensor when left out."""
+    altitude: PlaceSensor | None = None
+    """Altimeter: the bus's height above z = 0; none when left out."""
+    ground_velocity: SpeedSensor | None = None
+    """Velocimeter: the bus's velocity in body axes; none when left out."""
+    specific_force: Accelerometer | None = None
+    """Accelerometers at the bus's origin; none when left out."""

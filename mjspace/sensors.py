@@ -1,4 +1,4 @@
-"""Star tracker, gyro and tachometers: the truth, sampled late, with errors, and held in between."""
+"""A vehicle's sensors: the truth, sampled late, with errors, and held in between."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,8 +11,12 @@ import numpy as np
 from mjspace.contract import Array, Measurement
 from mjspace.noise import normals
 from mjspace.quantity import whole_number
-from mjspace.sensor_tables import RateSensor, Sensors, StarTracker
+from mjspace.sensor_tables import Errors, Sensors
+from mjspace.strapdown import Strapdown
 from mjspace.tables import Rates
+
+NAVIGATION = ("position", "velocity", "altitude", "ground_velocity", "specific_force")
+"""The fields of ``Measurement`` whose sensors a scenario may leave out."""
 
 State = dict[str, Array]
 """What the sensors remember, vehicle axis first. Each one that is not ideal has
@@ -33,11 +37,18 @@ class SensorSuite:
     """
 
     def __init__(
-        self, sensors: Sensors, rates: Rates, seed: int, members: Sequence[int], wheels: int
+        self,
+        sensors: Sensors,
+        rates: Rates,
+        seed: int,
+        members: Sequence[int],
+        wheels: int,
+        gravity: Callable[[Array], Array] = np.zeros_like,
     ) -> None:
         """Draw the constant biases of ``members``, the vehicles' numbers in the campaign ``seed``.
 
-        A member measures the same alone or in any batch.
+        A member measures the same alone or in any batch. ``gravity`` gives what accelerometers do
+        not feel, [m/s^2], at each position [m], both (N, 3) in inertial axes.
 
         Raises:
             ValueError: a period is no whole number of integration steps, a delay no whole number of
@@ -48,17 +59,26 @@ class SensorSuite:
                 f"sensors.attitude.quantization {sensors.attitude.quantization:g} rad: "
                 "must be less than 1 rad"
             )
-        axes = {"attitude": 3, "rate": 3, "wheel_speed": wheels}
+        widths = {"wheel_speed": wheels, "altitude": 1}
         every = [
-            _sensor(name, getattr(sensors, name), rates, seed, members, width)
-            for name, width in axes.items()
+            _sensor(name, table, rates, seed, members, widths.get(name, 3))
+            for name, table in sensors
+            if table is not None
         ]
         self._sensors = [sensor for sensor in every if sensor is not None]
+        self._absent = [name for name in NAVIGATION if getattr(sensors, name) is None]
+        self._ideal = not self._sensors and len(self._absent) in (0, len(NAVIGATION))
+        self._strapdown = None
+        if sensors.specific_force is not None:
+            period = next(s.period for s in self._sensors if s.name == "specific_force")
+            self._strapdown = Strapdown(gravity, period, rates.physics)
         self.ticks = frozenset(sensor.period for sensor in self._sensors)
 
     def reset(self, truth: Measurement) -> State:
         """Return the state before the first sample, at step 0, where the ``truth`` is given."""
         state: State = {}
+        if self._strapdown is not None:
+            truth = truth._replace(specific_force=self._strapdown.reset(state, truth))
         for sensor in self._sensors:
             if sensor.walk:
                 state[sensor.walk_field] = np.zeros_like(sensor.bias)
@@ -74,14 +94,18 @@ class SensorSuite:
         ``truth`` has a vehicle axis: attitude (N, 4), rate (N, 3), wheel_speed (N, n). ``state`` is
         left as it is, so that this step may be sampled from it again.
         """
-        if not self._sensors:
+        if self._ideal:
             return state, truth
         state = state.copy()
         seen = truth._asdict()
+        if self._strapdown is not None and step_index % self._strapdown.period == 0:
+            seen["specific_force"] = self._strapdown.take(state, step_index, truth)
         for sensor in self._sensors:
             if step_index % sensor.period == 0:
                 sensor.take(state, step_index // sensor.period, seen[sensor.name])
             seen[sensor.name] = state[sensor.samples_field][:, 0]
+        for name in self._absent:
+            seen[name] = seen[name][:, :0]
         return state, Measurement(**seen)
 
 
@@ -121,7 +145,7 @@ class _Sensor:
 
 def _sensor(
     name: str,
-    table: StarTracker | RateSensor,
+    table: Errors,
     rates: Rates,
     seed: int,
     members: Sequence[int],
@@ -133,7 +157,8 @@ def _sensor(
     period = whole_number(seconds, rates.physics, period_key, "rates.physics")
     control = rates.steps
     errors = (table.noise, table.bias, table.bias_walk, table.quantization, table.delay)
-    if not any(errors) and control % period == 0:
+    follows = name != "specific_force"  # which is a mean over its own period
+    if follows and not any(errors) and control % period == 0:
         return None
     delay = table.delay and whole_number(table.delay, seconds, f"sensors.{name}.delay", period_key)
     number = Measurement._fields.index(name)

@@ -3,7 +3,6 @@
 import math
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
@@ -15,47 +14,12 @@ from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
-from mjspace.scenario import Scenario
+from mjspace.start import Start, last_period
 from mjspace.tape import Block, Columns, Tape, until_trouble
 
 BLOCK_PERIODS = 500
 BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
 BLOCK_SECONDS = 0.25  # of wall time: a kill may cost three blocks, and should not cost a second
-INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
-
-
-@dataclass(frozen=True)
-class Start:
-    """Where a flight begins: any period of any flight, with everything that is remembered there."""
-
-    period: int
-    physics: Array
-    """MuJoCo's integration state, (N, nstate)."""
-    sensors: dict[str, Array]
-    """The sensors' state before they sample in this period."""
-    law: Any
-    """The law's state before it steps in this period; None: the law is reset here."""
-    actuators: dict[str, Array] = field(default_factory=dict)
-    """The actuators' state at the period's start."""
-
-
-def last_period(scenario: Scenario) -> int:
-    """Return the number of the scenario's last control period."""
-    return math.floor(scenario.duration / scenario.rates.control * (1.0 + 1e-12))
-
-
-def first_start(assembly: Assembly, members: Sequence[int]) -> Start:
-    """Return time zero of the scenario for these members."""
-    model = assembly.vehicle.model
-    data = mujoco.MjData(model)
-    data.qpos, data.qvel = assembly.qpos, assembly.qvel
-    data.userdata = assembly.userdata
-    row = np.empty(mujoco.mj_stateSize(model, INTEGRATION))
-    mujoco.mj_getState(model, data, row, INTEGRATION)
-    physics = np.repeat(row[None], len(members), axis=0)
-    actuators = assembly.actuators.reset(len(members))
-    truth = assembly.actuators.seen(actuators, Columns(assembly).truth(physics))
-    return Start(0, physics, assembly.sensors(members).reset(truth), None, actuators)
 
 
 def fly(
@@ -113,6 +77,7 @@ class _Flight:
         self.applied = self._applied(assembly.actuators.acts_on)
         self.sensordata = self.batch.bind("sensordata")
         self.actuators, self.actuator_state = assembly.actuators, start.actuators
+        self.masses = getattr(assembly.actuators, "masses", None)
         self.inner = getattr(assembly.law, "inner", None)
         self.push = None
         if assembly.disturbance is not None:
@@ -156,6 +121,8 @@ class _Flight:
     def _fly_period(
         self, tape: Tape, period: int, now: float, reference: Wanted, *, flown: bool
     ) -> None:
+        if self.masses is not None:
+            self._weigh(self.masses(self.actuator_state))
         physics = self.batch.state.copy()
         truth = self._truth(physics)
         tape.physics.append(physics)
@@ -216,6 +183,12 @@ class _Flight:
             ) from error
         self.applied[:] = motor
         return motor, saturated
+
+    def _weigh(self, masses: dict[str, tuple[int, Array]]) -> None:
+        """Give bodies the mass that they have by now, and keep it for the period."""
+        for name, (body, values) in masses.items():
+            self.batch.expand(name)[:, body] = values
+        self.batch.set_const()
 
     def _applied(self, array: str) -> Array:
         """Return the view of MuJoCo's input that the actuators fill."""

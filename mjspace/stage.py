@@ -8,7 +8,7 @@ import numpy as np
 from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.environment import orbit_position
-from mjspace.tables import Orbit
+from mjspace.environment_tables import Orbit
 
 AXES = 3
 """The geom group of a model's body axes: not part of the vehicle, shown in pictures."""

@@ -1,9 +1,9 @@
-"""The tables of a scenario: rates, plant, initial state and environment."""
+"""The tables of a scenario: rates, plant and initial state."""
 
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from mjspace.drive_tables import Pmsm
 from mjspace.fields import (
@@ -21,10 +21,10 @@ from mjspace.fields import (
     Seconds,
     Si,
     Table,
-    Torque3,
     Unit3,
     Velocity3,
 )
+from mjspace.landing_tables import Engine, Ground
 from mjspace.quantity import whole_number
 
 
@@ -116,6 +116,11 @@ class PlantTable(Table):
     gyrostat_inertia: Matrix3 | None = None
     """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia; the
     bus inertia follows from it."""
+    vehicle_mass: Annotated[Positive, Si("kg")] | None = None
+    """Mass of the whole vehicle, with all that is on it; the bus's follows, not ``mass``."""
+    vehicle_inertia: Matrix3 | None = None
+    """Inertia of the whole vehicle, joints at rest, about its centre of mass, which is the body
+    origin; the bus inertia follows. Wants ``vehicle_mass``."""
     wheels: Wheels = Wheels()
     parts: dict[Name, Part] = {}
     """By a name of one's own: ``[plant.parts.damper]``. They add to the bus's mass and inertia, and
@@ -127,20 +132,34 @@ class PlantTable(Table):
     """Torque ripple of motors, by the hinge."""
     ideal_thrusters: bool = False
     """Whether the law's torque acts on the bus as if by thrusters, as it is; no wheels then."""
+    engine: Engine | None = None
+    """What its engine on gimbals does, of a model that has one; no wheels then."""
+    ground: Ground | None = None
+    """What is below it; nothing when left out."""
 
     @model_validator(mode="after")
     def _one_kind_of_motor(self) -> "PlantTable":
-        if (self.drives or self.ideal_thrusters) and self.wheels.axes:
+        kinds = {
+            "drives": bool(self.drives),
+            "ideal_thrusters": self.ideal_thrusters,
+            "engine": self.engine is not None,
+        }
+        given = [name for name, is_given in kinds.items() if is_given]
+        if given and self.wheels.axes:
             raise ValueError("one kind of motor: set wheels.axes = [] to fly without wheels")
-        if self.drives and self.ideal_thrusters:
-            raise ValueError("drives and ideal_thrusters are both given: give one")
+        if len(given) > 1:
+            raise ValueError(f"{given[0]} and {given[1]} are both given: give one")
         return self
 
     @model_validator(mode="after")
     def _one_inertia(self) -> "PlantTable":
-        if self.bus_inertia is not None and self.gyrostat_inertia is not None:
-            raise ValueError("bus_inertia and gyrostat_inertia are both given: give one")
-        for name in ("bus_inertia", "gyrostat_inertia"):
+        names = ("bus_inertia", "gyrostat_inertia", "vehicle_inertia")
+        given = [name for name in names if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise ValueError(f"{given[0]} and {given[1]} are both given: give one")
+        if (self.vehicle_mass is None) != (self.vehicle_inertia is None):
+            raise ValueError("vehicle_mass and vehicle_inertia: give both or neither")
+        for name in names:
             rows = getattr(self, name)
             if rows is None:
                 continue
@@ -184,55 +203,3 @@ class Initial(Table):
         if self.attitude is not None and np.linalg.norm(self.attitude) < 1e-6:
             raise ValueError("attitude: a zero quaternion is no attitude")
         return self
-
-
-class Orbit(Table):
-    """A Kepler orbit: its gravity gradient acts on every body, in the free-fall frame."""
-
-    body: Literal["earth", "moon"] = "earth"
-    """What is orbited."""
-    semi_major_axis: Annotated[Positive, Si("m")]
-    """From the body's centre."""
-    eccentricity: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    """0 is a circle."""
-    inclination: Angle = 0.0
-    """To the inertial x-y plane."""
-    ascending_node: Angle = 0.0
-    """Right ascension of the ascending node."""
-    periapsis: Angle = 0.0
-    """Argument of periapsis."""
-    true_anomaly: Angle = 0.0
-    """At time zero."""
-
-
-class Sine(Table):
-    """One sinusoid of a disturbance torque, on each axis: amplitude sin(frequency t + phase)."""
-
-    amplitude: Torque3
-    """On each axis."""
-    frequency: Annotated[Positive, Si("rad/s")]
-    """The same on every axis."""
-    phase: Angles3 = [0.0, 0.0, 0.0]
-    """On each axis."""
-
-
-class DisturbanceTorque(Table):
-    """A torque on the bus from outside: a bias and a sum of sinusoids of time."""
-
-    frame: Literal["body", "inertial"] = "body"
-    """The axes in which the components are constant or periodic."""
-    bias: Torque3 = [0.0, 0.0, 0.0]
-    """Constant part."""
-    sines: list[Sine] = []
-    """Periodic part."""
-
-
-class Environment(Table):
-    """What acts on the vehicle from outside; nothing when left out."""
-
-    orbit: Orbit | None = None
-    torques: list[DisturbanceTorque] = []
-    """Evaluated at every stage of the integrator."""
-    python: str | None = None
-    """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
-    inertial axes, torque [N m] in body axes), held over each integration step: first order only."""

@@ -11,6 +11,7 @@ from mjspace import attitude
 from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import FlightError
+from mjspace.sensors import NAVIGATION
 
 Rows = dict[str, dict[str, Array]]
 
@@ -37,6 +38,10 @@ def shapes(block: Block) -> dict[str, dict[str, tuple[int, ...]]]:
     return {t: {f: a.shape[2:] for f, a in fields.items()} for t, fields in block.rows.items()}
 
 
+PRESSED = 0.001
+"""m that a leg's strut gives when its foot stands on the ground; in flight it is drawn out."""
+
+
 class Columns:
     """Where things stand in a row of MuJoCo's integration state."""
 
@@ -54,17 +59,34 @@ class Columns:
         self.wheel_speed = _columns(before_qvel + vehicle.wheel_dof)
         self.gimbal_angle = _columns(before_qpos + vehicle.gimbal_qpos)
         self.gimbal_rate = _columns(before_qvel + vehicle.gimbal_dof)
+        self.struts = _columns(before_qpos + vehicle.strut_qpos)
+        self.has_legs = len(vehicle.strut_qpos) > 0
+        sensors = assembly.scenario.sensors
+        self.navigates = any(getattr(sensors, name) is not None for name in NAVIGATION)
 
     def truth(self, physics: Array) -> Measurement:
-        """Return what ideal sensors see, as views of the state rows."""
-        return Measurement(
+        """Return what ideal sensors see, as views of the state rows where that is possible."""
+        nothing = physics[..., :0]
+        seen = Measurement(
             physics[..., self.attitude],
             physics[..., self.rate],
             physics[..., self.wheel_speed],
             physics[..., self.gimbal_angle],
             physics[..., self.gimbal_rate],
-            *[physics[..., :0]] * 6,
+            *[nothing] * 9,
         )
+        if self.has_legs:
+            standing = np.sum(physics[..., self.struts] > PRESSED, axis=-1, keepdims=True) >= 2
+            seen = seen._replace(contact=standing.astype(float))
+        if self.navigates:
+            velocity = physics[..., self.velocity]
+            seen = seen._replace(
+                position=physics[..., self.position],
+                velocity=velocity,
+                altitude=physics[..., self.position][..., 2:],
+                ground_velocity=attitude.rotate(attitude.conjugate(seen.attitude), velocity),
+            )
+        return seen
 
 
 def until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:
@@ -140,6 +162,7 @@ class Tape:
                 **_without_empty(truth._asdict()),
                 "position": physics[..., columns.position],
                 "velocity": physics[..., columns.velocity],
+                **_place_error(physics[..., columns.position], reference),
                 "momentum": data[..., vehicle.momentum],
                 "energy": data[..., vehicle.kinetic],
                 "attitude_error": attitude.rotation_angle(truth.attitude, reference["attitude"])[
@@ -163,6 +186,13 @@ class Tape:
             time, np.array(self.saturated[:n], bool), saturated_before, vehicle.motors
         )
         return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
+
+
+def _place_error(position: Array, reference: dict[str, Array]) -> dict[str, Array]:
+    """Return how far the vehicle is from where it is wanted, if it is wanted somewhere."""
+    if "position" not in reference:
+        return {}
+    return {"position_error": position - reference["position"]}
 
 
 def _columns(indices: Any) -> Any:

@@ -14,7 +14,7 @@ from mjspace import environment
 from mjspace.constants import GM
 from mjspace.contract import Array
 from mjspace.environment_kernel import MAGIC
-from mjspace.tables import DisturbanceTorque, Environment, Orbit, Sine
+from mjspace.environment_tables import DisturbanceTorque, Environment, Orbit, Sine
 
 CIRCULAR = Orbit(semi_major_axis=7.0e6)
 ELLIPTIC = Orbit(

@@ -24,7 +24,8 @@ from mjspace.errors import InputError
 from mjspace.guards import ModelWarning
 from mjspace.loading import load, scenario_names
 from mjspace.plant import UnphysicalInertiaWarning
-from mjspace.simulation import INTEGRATION, first_start, fly
+from mjspace.simulation import fly
+from mjspace.start import INTEGRATION, first_start
 
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore::{kind.__module__}.{kind.__name__}")

@@ -21,6 +21,7 @@ SOUND = """
       <geom name="hull" type="box" size="1 1 1"/>
       <body name="rotor">
         <joint name="spin" axis="0 0 1" {joint}/>
+        <geom name="rotor" size="0.1"/>
         <inertial pos="{offset} 0 0" mass="2" diaginertia="0.025 0.025 0.05" euler="0 {tilt} 0"/>
       </body>
     </body>
@@ -81,7 +82,7 @@ def test_every_defect_is_named_at_once() -> None:
     [
         ({"integrator": "Euler"}, r"integrator is EULER, first order.*RK4"),
         ({"integrator": "implicitfast"}, "integrator is IMPLICITFAST"),
-        ({"contact": "enable", "constraint": "enable"}, "1 geoms may collide"),
+        ({"contact": "enable", "constraint": "enable"}, "2 geoms may collide"),
         ({"joint": 'frictionloss="0.1"'}, "1 friction losses"),
         ({"joint": 'limited="true" range="-1 1"'}, "1 joint limits"),
     ],

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 
 from mjspace.constants import GM
 from mjspace.environment import orbit_position
+from mjspace.environment_tables import Orbit
 from mjspace.kepler import eccentric_anomaly
-from mjspace.tables import Orbit
 
 
 @pytest.mark.parametrize("eccentricity", [0.0, 1e-9, 0.1, 0.7, 0.99, 0.999999])

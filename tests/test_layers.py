@@ -24,7 +24,9 @@ ONLY_IN = {
     "mujoco": (
         *(
             "plant",
+            "addresses",
             "composition",
+            "start",
             "environment",
             "struct_offsets",
             "guards",

@@ -9,13 +9,15 @@ import pytest
 
 from mjspace import environment
 from mjspace.assembly import assemble
+from mjspace.environment_tables import Environment
 from mjspace.errors import FlightError, InputError
 from mjspace.flight import run
 from mjspace.loading import load
 from mjspace.log_reader import Log
 from mjspace.replay import replay, verify
-from mjspace.simulation import first_start, fly
-from mjspace.tables import Environment, Ripple
+from mjspace.simulation import fly
+from mjspace.start import first_start
+from mjspace.tables import Ripple
 
 SHORT = "duration=0.05"
 QUIET = ["environment.torques=[]", "checks=[]", SHORT]

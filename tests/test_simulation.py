@@ -13,7 +13,8 @@ from mjspace.contract import Measurement, Reference
 from mjspace.errors import FlightError
 from mjspace.loading import load
 from mjspace.plant import UnphysicalInertiaWarning
-from mjspace.simulation import Start, first_start, fly
+from mjspace.simulation import fly
+from mjspace.start import Start, first_start
 from mjspace.tape import Block, Columns
 
 pytestmark = pytest.mark.filterwarnings(

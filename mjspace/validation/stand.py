@@ -16,7 +16,7 @@ import numpy as np
 
 from mjspace import environment
 from mjspace.contract import Array
-from mjspace.tables import Environment
+from mjspace.environment_tables import Environment
 from mjspace.validation.benchmark import Conditions, Fault
 
 Load = Callable[[Any, Any, float], Array]

@@ -9,7 +9,7 @@ from scipy.integrate import simpson, solve_ivp
 from mjspace import attitude, kepler
 from mjspace.constants import GM
 from mjspace.contract import Array
-from mjspace.tables import Orbit
+from mjspace.environment_tables import Orbit
 from mjspace.validation import stand
 from mjspace.validation.benchmark import (
     Benchmark,

@@ -1,0 +1,140 @@
+"""An engine on two gimbals, as a vehicle's actuators: throttle, servos, propellant."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numba import guvectorize
+
+from mjspace.actuators import State
+from mjspace.constants import STANDARD_GRAVITY
+from mjspace.contract import Array, Measurement
+from mjspace.landing_tables import Engine
+from mjspace.plant import Vehicle
+
+DRY = 1e-6
+"""kg left in a tank that is empty: a body with none would have no inertia."""
+FIELDS = ("thrust", "propellant", "burning", "clock")
+
+
+@dataclass(frozen=True)
+class GimballedEngine:
+    """One engine; its hinges turn the outer gimbal and then the inner."""
+
+    data: Array
+    """The engine's numbers, in the order that the kernel reads them."""
+    tank: int
+    """The body whose mass is the propellant's; 0: none burns."""
+    full: Array
+    """Principal moments [kg m^2] of that body for each kilogram in it, shape (3,)."""
+    propellant: float
+    """At the start [kg]."""
+
+    logged_as: ClassVar[str] = "engine"
+    takes: ClassVar[str] = "thrust of shape (..., 1) [N] and gimbal of shape (..., 2) [rad]"
+    acts_on: ClassVar[str] = "ctrl"
+    stateful: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, table: Engine) -> Self:
+        """Return the engine of a vehicle that has one, and a body called ``tank``."""
+        model = vehicle.model
+        tank = model.body("tank").id
+        flow = 0.0
+        if table.specific_impulse is not None:
+            flow = 1.0 / (table.specific_impulse * STANDARD_GRAVITY)
+        data = [
+            table.thrust_min,
+            table.thrust_max,
+            table.thrust_lag,
+            flow,
+            table.gimbal_limit,
+            np.inf if table.gimbal_rate_limit is None else table.gimbal_rate_limit,
+            1.0 / table.gimbal_lag,
+            table.gimbal_rate_gain,
+            np.inf if table.fails_at is None else table.fails_at,
+        ]
+        held = float(model.body_mass[tank])
+        return cls(
+            np.array(data),
+            tank if flow else 0,
+            model.body_inertia[tank] / held,
+            held if table.propellant is None else table.propellant,
+        )
+
+    def reset(self, vehicles: int) -> State:
+        """Return an engine that is about to start.
+
+        Its fields, (N, 1): "thrust" [N], "propellant" [kg], "burning" (1.0 until it is put out or
+        has run dry) and "clock" [s].
+        """
+        one = np.ones((vehicles, 1))
+        return {
+            "thrust": 0.0 * one,
+            "propellant": self.propellant * one,
+            "burning": one,
+            "clock": 0.0 * one,
+        }
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, Array, Array]:
+        """Return (state, [outer torque, inner torque, thrust], whether each is cut), (N, 3)."""
+        packed = np.concatenate([state[name] for name in FIELDS], axis=-1)
+        wanted = np.concatenate([command.thrust, command.gimbal], axis=-1)
+        after, acting, cut = _engine.ufunc(
+            packed, wanted, truth.gimbal_angle, truth.gimbal_rate, self.data, step
+        )
+        return {name: after[:, i : i + 1] for i, name in enumerate(FIELDS)}, acting, cut
+
+    def seen(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth with thrust and what is left in the tank."""
+        return truth._replace(thrust=state["thrust"], propellant=state["propellant"])
+
+    def masses(self, state: State) -> dict[str, tuple[int, Array]]:
+        """Return, of MuJoCo's model, the body and the values of each field that burning changes."""
+        if not self.tank:
+            return {}
+        left = np.maximum(state["propellant"], DRY)
+        return {
+            "body_mass": (self.tank, left[:, 0]),
+            "body_inertia": (self.tank, left * self.full),
+        }
+
+
+@guvectorize(
+    ["void(f8[:],f8[:],f8[:],f8[:],f8[:],f8,f8[:],f8[:],f8[:])"],
+    "(s),(c),(g),(g),(d),()->(s),(c),(c)",
+    cache=True,
+)
+def _engine(
+    state: Any,
+    wanted: Any,
+    angle: Any,
+    rate: Any,
+    data: Any,
+    step: Any,
+    after: Any,
+    acting: Any,
+    cut: Any,
+) -> None:
+    """Advance thrust, tank and clock by ``step`` [s]; give the torques and the mean thrust."""
+    least, most, lag, flow, limit, rate_limit, position_gain, rate_gain, fails_at = data
+    thrust, left, burning, clock = state
+    # What is asked of an engine that is out stays unheard: it does not start twice.
+    if wanted[0] <= 0.0 or clock >= fails_at or left <= 0.0:
+        burning = 0.0
+    target = burning * min(max(wanted[0], least), most)
+    if burning == 0.0:
+        thrust = 0.0  # the valves shut at once
+    share = np.exp(-step / lag) if lag > 0.0 else 0.0
+    ahead = target + (thrust - target) * share
+    mean = target + (thrust - target) * (1.0 - share) * lag / step
+    after[0], after[1] = ahead, max(left - flow * mean * step, 0.0)
+    after[2], after[3] = burning, clock + step
+    acting[2], cut[2] = mean, 1.0 if burning > 0.0 and target != wanted[0] else 0.0
+    for i in range(2):
+        goal = min(max(wanted[1 + i], -limit), limit)
+        pace = min(max(position_gain * (goal - angle[i]), -rate_limit), rate_limit)
+        acting[i] = rate_gain * (pace - rate[i])
+        cut[i] = 1.0 if goal != wanted[1 + i] else 0.0

@@ -1,0 +1,67 @@
+"""The tables of what acts on a vehicle from outside."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from mjspace.fields import Angle, Angles3, Positive, Si, Table, Torque3
+from mjspace.landing_tables import CentralGravity
+
+
+class Orbit(Table):
+    """A Kepler orbit: its gravity gradient acts on every body, in the free-fall frame."""
+
+    body: Literal["earth", "moon"] = "earth"
+    """What is orbited."""
+    semi_major_axis: Annotated[Positive, Si("m")]
+    """From the body's centre."""
+    eccentricity: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    """0 is a circle."""
+    inclination: Angle = 0.0
+    """To the inertial x-y plane."""
+    ascending_node: Angle = 0.0
+    """Right ascension of the ascending node."""
+    periapsis: Angle = 0.0
+    """Argument of periapsis."""
+    true_anomaly: Angle = 0.0
+    """At time zero."""
+
+
+class Sine(Table):
+    """One sinusoid of a disturbance torque, on each axis: amplitude sin(frequency t + phase)."""
+
+    amplitude: Torque3
+    """On each axis."""
+    frequency: Annotated[Positive, Si("rad/s")]
+    """The same on every axis."""
+    phase: Angles3 = [0.0, 0.0, 0.0]
+    """On each axis."""
+
+
+class DisturbanceTorque(Table):
+    """A torque on the bus from outside: a bias and a sum of sinusoids of time."""
+
+    frame: Literal["body", "inertial"] = "body"
+    """The axes in which the components are constant or periodic."""
+    bias: Torque3 = [0.0, 0.0, 0.0]
+    """Constant part."""
+    sines: list[Sine] = []
+    """Periodic part."""
+
+
+class Environment(Table):
+    """What acts on the vehicle from outside; nothing when left out."""
+
+    orbit: Orbit | None = None
+    gravity: CentralGravity | None = None
+    torques: list[DisturbanceTorque] = []
+    """Evaluated at every stage of the integrator."""
+    python: str | None = None
+    """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
+    inertial axes, torque [N m] in body axes), held over each integration step: first order only."""
+
+    @model_validator(mode="after")
+    def _one_planet(self) -> "Environment":
+        if self.orbit is not None and self.gravity is not None:
+            raise ValueError("orbit and gravity are both given: fly round the planet or land on it")
+        return self
