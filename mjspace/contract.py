@@ -39,6 +39,8 @@ class Measurement(NamedTuple):
     """Height of the bus above the plane z = 0 [m], shape (..., 1)."""
     ground_velocity: Array = np.zeros(0)
     """What a velocimeter shows: of the bus, body axes [m/s], shape (..., 3)."""
+    contact: Array = np.zeros(0)
+    """1.0 while at least two feet touch the ground, shape (..., 1)."""
 
 
 class Reference(NamedTuple):
