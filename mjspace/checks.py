@@ -27,8 +27,7 @@ class Verdict:
     @property
     def passed(self) -> bool:
         """Whether the measured value keeps its bounds; a value that is no number never does."""
-        below, above = self.check.below, self.check.above
-        return (below is None or self.measured < below) and (above is None or self.measured > above)
+        return bool(self.check.admits(self.measured))
 
     @property
     def bound(self) -> str:
@@ -90,6 +89,12 @@ def find_signal(topics: Topics, signal: str) -> tuple[str, str, int | None]:
     return topic, field, None if index is None else int(index)
 
 
+def magnitude(rows: Array) -> Array:
+    """Return a signal's values (...) from its ``rows`` (..., k): of a vector its norm."""
+    values: Array = rows[..., 0] if rows.shape[-1] == 1 else np.linalg.norm(rows, axis=-1)
+    return values
+
+
 def _measure(log: Log, check: Check) -> float:
     topic, field, index = find_signal(log.topics, check.signal)
     target = None if check.target is None else np.asarray(check.target, dtype=float)
@@ -104,7 +109,7 @@ def _measure(log: Log, check: Check) -> float:
             first = rows[0]
         if check.statistic == "drift":
             rows = rows - first
-        values = rows[:, 0] if rows.shape[1] == 1 else np.linalg.norm(rows, axis=1)
+        values = magnitude(rows)
         if check.statistic in ("peak", "drift") or target is not None:
             values = np.abs(values)
         count += len(values)

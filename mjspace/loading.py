@@ -24,17 +24,16 @@ def scenario_names() -> list[str]:
 def load(scenario: str | Path, overrides: Iterable[str] = ()) -> tuple[Scenario, Path]:
     """Return the scenario of that name or path, and the folder its own files are beside.
 
-    ``overrides`` are ``key=value`` with a dotted key and a TOML value; a bare word is a string.
+    A file may say ``base``: another scenario, by its name or by a path from the file's folder,
+    whose tables it changes key by key. A table of another ``kind`` replaces the base's as a whole.
+    ``overrides``, which come last, are ``key=value`` with a dotted key and a TOML value; a bare
+    word is a string.
 
     Raises:
         InputError: no such scenario, no TOML, or a key that is wrong; one line.
     """
     path = _find(str(scenario))
-    try:
-        table = tomllib.loads(path.read_text())
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: {error}") from None
-    table.setdefault("name", path.stem)
+    table = _read(path, ())
     origins = {}
     for override in overrides:
         origins[_override(table, override)] = f"--set {override}"
@@ -77,8 +76,45 @@ def to_toml(scenario: Scenario) -> str:
     return table
 
 
+def _read(path: Path, upon: tuple[Path, ...]) -> dict[str, Any]:
+    """Return the file's table merged over its base's; ``upon`` are the files based on it."""
+    try:
+        table = tomllib.loads(path.read_text())
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: {error}") from None
+    table.setdefault("name", path.stem)
+    if "base" not in table:
+        return table
+    base, upon = table.pop("base"), (*upon, path.resolve())
+    if not isinstance(base, str):
+        raise InputError(f"{path}: base: got {base!r}, should be a scenario's name or a path")
+    try:
+        below = _find(str(path.parent / base) if _is_path(base) else base)
+    except InputError as error:
+        raise InputError(f"{path}: base: {error}") from None
+    if below.resolve() in upon:
+        raise InputError(f"{path}: base: {base!r} is based on this file itself")
+    return _merged(_read(below, upon), table)
+
+
+def _merged(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
+    """Return ``base`` with the keys of ``table``: tables merge, all else is replaced."""
+    if "kind" in table and table["kind"] != base.get("kind"):
+        return table  # the gains of one law mean nothing to another
+    merged = dict(base)
+    for key, value in table.items():
+        old = base.get(key)
+        tables = isinstance(value, dict) and isinstance(old, dict)
+        merged[key] = _merged(base[key], value) if tables else value
+    return merged
+
+
+def _is_path(scenario: str) -> bool:
+    return scenario.endswith(".toml") or "/" in scenario
+
+
 def _find(scenario: str) -> Path:
-    if scenario.endswith(".toml") or "/" in scenario:
+    if _is_path(scenario):
         if not Path(scenario).is_file():
             raise InputError(f"no scenario file {scenario}")
         return Path(scenario)

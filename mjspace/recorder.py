@@ -107,8 +107,8 @@ class Recorder:
         rows = one_vehicle(block)
         # What goes into a chunk beside the periods must be handed over before them.
         self._write_frames(block, rows["/state"]["physics"])
-        for time, _, text in block.events:
-            self._log.event(time, "WARNING", text)
+        for time, _, level, text in block.events:
+            self._log.event(time, level, text)
         self._log.write(block.time, rows)
         self.time = float(block.time[-1])
 

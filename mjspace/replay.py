@@ -55,7 +55,7 @@ def replay(
     """Fly a log again from time ``start`` [s] into a new log, ``flight.mcap`` in ``out``.
 
     Under another ``law``, whose files are looked up from ``folder``, its state begins at ``start``,
-    and the checks of the logged law's signals are left out.
+    and the checks and events of the logged law's signals are left out.
 
     Raises:
         InputError: no such log, time or law.
@@ -114,8 +114,11 @@ def assembly_of(
         scenario = scenario_of(log)
     if law is not None:
         # What the logged law signals, another need not.
-        kept = [check for check in scenario.checks if not check.signal.startswith("law.")]
-        scenario = scenario.model_copy(update={"law": law, "checks": kept})
+        kept = {
+            "checks": [check for check in scenario.checks if not check.signal.startswith("law.")],
+            "events": [event for event in scenario.events if not event.signal.startswith("law.")],
+        }
+        scenario = scenario.model_copy(update={"law": law, **kept})
     with tempfile.TemporaryDirectory() as own:
         for role in SOURCES:
             if f"{role}.py" in log.attachments:

@@ -1,9 +1,12 @@
 """A scenario, whole: what flies, where, under which law, how long, and what it must show."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from mjspace.contract import Array
 from mjspace.environment_tables import Environment
 from mjspace.fields import Seconds, Table, Time
 from mjspace.quantity import any_to_si, whole_number
@@ -25,20 +28,50 @@ class Component(BaseModel):
         return dict(self.model_extra or {})
 
 
-class Check(Table):
-    """One thing that the flight must show, judged from the log alone."""
+class Region(Table):
+    """Where a logged signal is wanted, or watched."""
 
     name: str
-    """What it says in the table of checks."""
+    """What it says in the table of checks, or in the log."""
     signal: str
-    """``topic.field`` or ``topic.field[i]`` of the log: ``truth.attitude_error``."""
+    """``topic.field`` or ``topic.field[i]`` of the log: ``truth.attitude_error``; of a vector its
+    norm."""
+    below: float | None = None
+    """It must be less; a number in SI or a quantity."""
+    above: float | None = None
+    """It must be greater; a number in SI or a quantity."""
+
+    @field_validator("below", "above", mode="before")
+    @classmethod
+    def _quantity(cls, value: Any) -> Any:
+        return any_to_si(value) if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        if self.below is None and self.above is None:
+            raise ValueError("neither below nor above is given: a region must have an outside")
+        return self
+
+    def admits(self, value: Array | float) -> NDArray[np.bool_]:
+        """Return whether each value is inside; what is no number never is."""
+        below = True if self.below is None else np.less(value, self.below)
+        above = True if self.above is None else np.greater(value, self.above)
+        return np.logical_and(below, above)
+
+
+class Event(Region):
+    """What the log is to mention: each time the signal comes into the region, with its value."""
+
+    level: Literal["INFO", "WARNING"] = "INFO"
+    """Of the line on /events."""
+
+
+class Check(Region):
+    """One thing that the flight must show, judged from the log alone."""
+
     statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
     """Over the window: of the value, or of the norm of a vector; ``peak`` is the largest magnitude,
-    ``drift`` the largest change from the window's first value."""
-    below: float | None = None
-    """The statistic must be less; a number in SI or a quantity."""
-    above: float | None = None
-    """The statistic must be greater; a number in SI or a quantity."""
+    ``drift`` the largest change from the window's first value. It is what has to be in bounds."""
     start: Time = 0.0
     """The window's first instant."""
     end: Time | None = None
@@ -48,15 +81,8 @@ class Check(Table):
     relative: bool = False
     """The error is divided by the norm of ``target``."""
 
-    @field_validator("below", "above", mode="before")
-    @classmethod
-    def _quantity(cls, value: Any) -> Any:
-        return any_to_si(value) if isinstance(value, str) else value
-
     @model_validator(mode="after")
-    def _bounded(self) -> "Check":
-        if self.below is None and self.above is None:
-            raise ValueError("neither below nor above is given: a check must be able to fail")
+    def _of_an_error(self) -> Self:
         if self.relative and self.target is None:
             raise ValueError("relative needs a target")
         return self
@@ -83,6 +109,7 @@ class Scenario(Table):
     reference: Component
     law: Component
     checks: list[Check] = []
+    events: list[Event] = []
 
     @model_validator(mode="after")
     def _whole_periods(self) -> "Scenario":

@@ -12,6 +12,7 @@ from mujoco.batch import Batch, SimulationError
 from mjspace import environment, mujoco_log
 from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Wanted
+from mjspace.crossings import with_crossings
 from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.start import Start, last_period
@@ -37,10 +38,13 @@ def fly(
 
     Raises:
         FlightError: the flight cannot go on; every good period has been yielded before.
+        InputError: an event of the scenario is of no signal of this flight; nothing was yielded.
     """
     flight = _Flight(assembly, start, members, threads)
     last = last_period(assembly.scenario)
     saturated = np.zeros((len(members), len(assembly.vehicle.motors)), dtype=bool)
+    declared = assembly.scenario.events
+    inside = np.zeros((len(members), len(declared)), dtype=bool)
     period = start.period
     while period <= last:
         tape, trouble = flight.record(period, last, stop)
@@ -50,6 +54,7 @@ def fly(
             tape.block(assembly, flight.columns, saturated), flight.columns
         )
         if len(block.time):
+            block, inside = with_crossings(block, declared, inside)
             yield block
         if problem or trouble:
             raise FlightError(problem or trouble)

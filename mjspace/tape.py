@@ -14,6 +14,8 @@ from mjspace.errors import FlightError
 from mjspace.sensors import NAVIGATION
 
 Rows = dict[str, dict[str, Array]]
+Happening = tuple[float, int, str, str]
+"""Time [s], vehicle, level (INFO or WARNING) and message of an event."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +26,7 @@ class Block:
     """Of the first row."""
     time: Array
     rows: Rows
-    events: list[tuple[float, int, str]]
-    """(time, vehicle, message)."""
+    events: list[Happening]
 
 
 def one_vehicle(block: Block, vehicle: int = 0) -> Rows:
@@ -229,9 +230,9 @@ def _without_empty(fields: dict[str, Array]) -> dict[str, Array]:
 
 def _saturation_events(
     time: Array, saturated: Array, before: Array, motors: Sequence[str]
-) -> list[tuple[float, int, str]]:
+) -> list[Happening]:
     rising = saturated & ~np.concatenate([before[None], saturated[:-1]])
     return [
-        (float(time[k]), int(vehicle), f"{motors[motor]} saturated")
+        (float(time[k]), int(vehicle), "WARNING", f"{motors[motor]} saturated")
         for k, vehicle, motor in np.argwhere(rising)
     ]

@@ -101,6 +101,53 @@ def test_a_check_that_cannot_fail_is_refused(minimal: Path) -> None:
     assert "below" in refusal(minimal, "checks=[{name='x', signal='truth.rate'}]")
 
 
+def test_a_scenario_changes_its_base_key_by_key(minimal: Path) -> None:
+    minimal.write_text(
+        MINIMAL + "rate_gain = 3\n[initial]\nrate = [1, 2, 3]\nposition = [1, 1, 1]\n"
+        "[[checks]]\nname = 'a'\nsignal = 'truth.rate'\nbelow = 1\n"
+    )
+    upper = minimal.parent / "upper.toml"
+    upper.write_text("base = 'mine.toml'\n[initial]\nrate = [0, 0, 7]\n[law]\nattitude_gain = 5")
+    top = minimal.parent / "deeper/top.toml"
+    top.parent.mkdir()
+    top.write_text("base = '../upper.toml'\nchecks = []\n[law]\nrate_gain = 4\n")
+    scenario, folder = load(top, ["law.attitude_gain=6"])
+    assert (scenario.name, folder) == ("top", top.parent)
+    assert scenario.description == "nothing much"
+    assert scenario.initial.rate == [0, 0, 7]
+    assert scenario.initial.position == [1, 1, 1]
+    assert scenario.law.gains == {"rate_gain": 4, "attitude_gain": 6}
+    assert scenario.checks == []
+    assert load(upper)[0].checks == load(minimal)[0].checks != []
+    assert "base" not in tomllib.loads(to_toml(scenario))
+
+
+def test_a_law_of_another_kind_has_none_of_the_base_s_gains(minimal: Path) -> None:
+    minimal.write_text("base = 'contraction-adaptive'\n[law]\nkind = 'contraction:Ideal'\n")
+    scenario, _ = load(minimal)
+    assert scenario.law.gains == {}
+    assert scenario.initial == load("contraction-adaptive")[0].initial
+
+
+@pytest.mark.parametrize(
+    ("base", "parts"),
+    [
+        ("'contraction-idael'", ["base: no scenario", "did you mean 'contraction-ideal'"]),
+        ("'gone.toml'", ["base: no scenario file", "gone.toml"]),
+        ("['a', 'b']", ["base: got ['a', 'b']", "a scenario's name or a path"]),
+        ("'mine.toml'", ["base: 'mine.toml' is based on this file itself"]),
+        ("'other.toml'", ["other.toml: base: './mine.toml' is based on this file itself"]),
+    ],
+)
+def test_a_base_that_will_not_do_is_said(minimal: Path, base: str, parts: list[str]) -> None:
+    minimal.write_text(f"base = {base}\n")
+    (minimal.parent / "other.toml").write_text("base = './mine.toml'\n")
+    message = refusal(minimal)
+    assert message.startswith(str(minimal.parent))
+    for part in parts:
+        assert part in message
+
+
 def test_unknown_scenario_gives_the_nearest() -> None:
     with pytest.raises(InputError, match="contraction-ideal"):
         load("contraction-idael")

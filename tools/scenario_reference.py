@@ -22,6 +22,15 @@ typed model that reads it. Unknown keys, wrong units and wrong shapes are refuse
 key and what would be right. Numbers are SI; where a unit is given, a string does too:
 `"30 deg/s"`, `"5 mN m"`, `"2 min"`. `mjspace info NAME` shows a scenario with every default written
 out, and `--set key=value` overrides any key.
+
+## On top of another
+
+`base = "dgvscmg-tracking"` begins with another scenario, one that comes with mjspace or a file by
+its path from this file's folder (`base = "../calm.toml"`), and the rest of the file is what
+differs. Tables merge key by key; numbers and lists, `[[checks]]` among them, replace the base's. A
+`[law]` or `[reference]` of another `kind` starts afresh, with none of the base's gains. A base may
+have a base; `--set` comes last. Files that a base names are looked up from this file's folder. What
+is logged is the whole, without `base`.
 """
 
 
