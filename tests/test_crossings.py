@@ -12,7 +12,8 @@ from mjspace.errors import InputError
 from mjspace.loading import load
 from mjspace.plant import UnphysicalInertiaWarning
 from mjspace.scenario import Event
-from mjspace.simulation import first_start, fly
+from mjspace.simulation import fly
+from mjspace.start import first_start
 from mjspace.tape import Block
 
 pytestmark = pytest.mark.filterwarnings(
