@@ -11,10 +11,13 @@ from mjspace.components import nearest
 from mjspace.contract import Array
 from mjspace.errors import InputError, blamed_on
 from mjspace.log_reader import Log
-from mjspace.scenario import Check
+from mjspace.scenario import Check, Event
 
 Topics = Mapping[str, Mapping[str, tuple[int, ...]]]
 """The shape of each field of each topic."""
+
+TICK = 1e-9
+"""s: what the log's stamps can tell apart."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +64,18 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
             raise InputError(f"checks.{number}.target: {count} numbers, {check.signal} has {size}")
 
 
-def judge(log: Log, checks: Sequence[Check]) -> list[Verdict]:
+def judge(log: Log, checks: Sequence[Check], events: Sequence[Event] = ()) -> list[Verdict]:
     """Return the verdict of each check, from the log alone, one chunk of it in memory at a time.
 
+    ``events`` are the scenario's, which checks may count from; one that has not happened leaves
+    nothing to measure.
+
     Raises:
-        ValueError: a check names a signal that the log does not have.
+        ValueError: a check or an event names a signal that the log does not have.
     """
-    return [Verdict(check, _measure(log, check)) for check in checks]
+    named = [name for check in checks for name in (check.since, check.until) if name]
+    happened = {event.name: _first(log, event) for event in events if event.name in named}
+    return [Verdict(check, _measure(log, check, *_window(check, happened))) for check in checks]
 
 
 def find_signal(topics: Topics, signal: str) -> tuple[str, str, int | None]:
@@ -95,12 +103,34 @@ def magnitude(rows: Array) -> Array:
     return values
 
 
-def _measure(log: Log, check: Check) -> float:
+def _first(log: Log, event: Event) -> float:
+    """Return when the event's signal is in its region first [s]; nan if never."""
+    topic, field, index = find_signal(log.topics, event.signal)
+    for block in log.blocks(topic, [field], start=None, end=None):
+        rows = block[field].reshape(len(block["time"]), -1)
+        inside = event.admits(magnitude(rows if index is None else rows[:, index : index + 1]))
+        if inside.any():
+            return float(block["time"][np.argmax(inside)])
+    return math.nan
+
+
+def _window(check: Check, happened: Mapping[str, float]) -> tuple[float, float]:
+    """Return the check's first and last instant [s]."""
+    zero = happened[check.since] if check.since else 0.0
+    end = math.inf if check.end is None else zero + check.end
+    before = happened[check.until] - TICK if check.until else math.inf
+    # min and max would pass by what has not happened
+    return zero + check.start, float(np.minimum(end, before))
+
+
+def _measure(log: Log, check: Check, start: float, end: float) -> float:
+    if math.isnan(start) or math.isnan(end):
+        return math.nan
     topic, field, index = find_signal(log.topics, check.signal)
     target = None if check.target is None else np.asarray(check.target, dtype=float)
     count, total, peak, least, last = 0, 0.0, -np.inf, np.inf, np.nan
     first: Array | None = None
-    for block in log.blocks(topic, [field], start=check.start, end=check.end):
+    for block in log.blocks(topic, [field], start=start, end=None if end == math.inf else end):
         rows = block[field].reshape(len(block["time"]), -1)
         rows = rows if index is None else rows[:, index : index + 1]
         if target is not None:

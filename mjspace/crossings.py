@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mjspace.checks import find_signal, magnitude
+from mjspace.checks import Topics, find_signal, magnitude
 from mjspace.contract import Array
 from mjspace.errors import blamed_on
 from mjspace.scenario import Event
@@ -19,22 +19,31 @@ def with_crossings(block: Block, declared: Sequence[Event], before: Array) -> tu
     begins inside has entered, and a value that is no number never is.
 
     Raises:
-        InputError: an event is of no signal of this flight, with the near names.
+        InputError: an event is of, or shows, no signal of this flight, with the near names.
     """
     happened: list[Happening] = []
     after = before.copy()
     topics = shapes(block)
     for number, event in enumerate(declared):
         with blamed_on(f"events.{number}.signal"):
-            topic, field, index = find_signal(topics, event.signal)
-        rows = block.rows[topic][field]
-        rows = rows.reshape(*rows.shape[:2], -1)
-        values = magnitude(rows if index is None else rows[..., index : index + 1])
+            values = magnitude(_rows(block, topics, event.signal))
+        with blamed_on(f"events.{number}.shows"):
+            shown = {name: _rows(block, topics, name) for name in event.shows}
         inside = event.admits(values)
         entered = inside & ~np.concatenate([before[None, :, number], inside[:-1]])
         after[:, number] = inside[-1]
         for k, vehicle in np.argwhere(entered):
             text = f"{event.name}: {event.signal} = {values[k, vehicle]:.6g}"
+            for name, of_name in shown.items():
+                text += f"; {name} = {' '.join(f'{value:.4g}' for value in of_name[k, vehicle])}"
             happened.append((float(block.time[k]), int(vehicle), event.level, text))
     in_order = sorted([*block.events, *happened], key=lambda happening: happening[:2])
     return replace(block, events=in_order), after
+
+
+def _rows(block: Block, topics: Topics, signal: str) -> Array:
+    """Return the signal's numbers, (n, N, k)."""
+    topic, field, index = find_signal(topics, signal)
+    rows = block.rows[topic][field]
+    rows = rows.reshape(*rows.shape[:2], -1)
+    return rows if index is None else rows[..., index : index + 1]

@@ -107,7 +107,7 @@ def fly_to_log(
             if trouble:
                 recorder.event("ERROR", trouble)
             recorder.flush()
-            verdicts = judge(Log(path), assembly.scenario.checks)
+            verdicts = judge(Log(path), assembly.scenario.checks, assembly.scenario.events)
             for verdict in verdicts:
                 recorder.event("INFO" if verdict.passed else "ERROR", verdict.line)
     return Result(path, verdicts, trouble, stop.signal)

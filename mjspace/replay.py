@@ -17,7 +17,7 @@ from mjspace.errors import InputError, blamed_on
 from mjspace.flight import Progress, Result, fly_to_log
 from mjspace.flown import scenario_of
 from mjspace.log_reader import Log
-from mjspace.scenario import Component
+from mjspace.scenario import Component, Scenario
 from mjspace.simulation import fly
 from mjspace.start import Start
 from mjspace.tape import one_vehicle
@@ -113,12 +113,7 @@ def assembly_of(
     with blamed_on("log"):
         scenario = scenario_of(log)
     if law is not None:
-        # What the logged law signals, another need not.
-        kept = {
-            "checks": [check for check in scenario.checks if not check.signal.startswith("law.")],
-            "events": [event for event in scenario.events if not event.signal.startswith("law.")],
-        }
-        scenario = scenario.model_copy(update={"law": law, **kept})
+        scenario = _without_signals_of_the_law(scenario).model_copy(update={"law": law})
     with tempfile.TemporaryDirectory() as own:
         for role in SOURCES:
             if f"{role}.py" in log.attachments:
@@ -126,6 +121,18 @@ def assembly_of(
         assembly = assemble(scenario, Path(own), law_folder=None if law is None else folder)
         model = plant.from_bytes(log.attachment("model.mjb.gz"))
         yield dataclasses.replace(assembly, vehicle=plant.on_model(assembly.vehicle, model))
+
+
+def _without_signals_of_the_law(scenario: Scenario) -> Scenario:
+    """Return the scenario without what looks at the law's signals, which another need not have."""
+
+    def is_free(*signals: str) -> bool:
+        return not any(signal.startswith("law.") for signal in signals)
+
+    events = [event for event in scenario.events if is_free(event.signal, *event.shows)]
+    told = {None, *(event.name for event in events)}
+    checks = [c for c in scenario.checks if is_free(c.signal) and {c.since, c.until} <= told]
+    return scenario.model_copy(update={"events": events, "checks": checks})
 
 
 def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = False) -> Start:

@@ -64,6 +64,8 @@ class Event(Region):
 
     level: Literal["INFO", "WARNING"] = "INFO"
     """Of the line on /events."""
+    shows: list[str] = []
+    """Other signals whose values the line gives as well."""
 
 
 class Check(Region):
@@ -76,6 +78,10 @@ class Check(Region):
     """The window's first instant."""
     end: Time | None = None
     """The window's last instant; the flight's when left out."""
+    since: str | None = None
+    """Name of an event: the window's instants are counted from when it first happened."""
+    until: str | None = None
+    """Name of an event: the window ends before it first happened."""
     target: float | list[float] | None = None
     """Taken from the signal first, so that the statistic is of an error."""
     relative: bool = False
@@ -110,6 +116,16 @@ class Scenario(Table):
     law: Component
     checks: list[Check] = []
     events: list[Event] = []
+
+    @model_validator(mode="after")
+    def _checks_of_events(self) -> "Scenario":
+        names = [event.name for event in self.events]
+        for number, check in enumerate(self.checks):
+            for key in ("since", "until"):
+                name = getattr(check, key)
+                if name is not None and name not in names:
+                    raise ValueError(f"checks.{number}.{key}: no event {name!r} in events: {names}")
+        return self
 
     @model_validator(mode="after")
     def _whole_periods(self) -> "Scenario":

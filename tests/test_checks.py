@@ -7,7 +7,7 @@ import pytest
 
 from mjspace.checks import judge, refuse_unknown
 from mjspace.errors import InputError
-from mjspace.scenario import Check
+from mjspace.scenario import Check, Event
 
 
 class Tape:
@@ -20,11 +20,13 @@ class Tape:
         self._rows = {"time": time, "error": error[:, None], "rate": rate}
 
     def blocks(
-        self, topic: str, fields: list[str], start: float, end: float | None
+        self, topic: str, fields: list[str], start: float | None, end: float | None
     ) -> Iterator[dict[str, np.ndarray]]:
         time = self._rows["time"]
         for part in np.array_split(np.arange(len(time)), 2):
-            inside = (time[part] >= start) & (time[part] <= (np.inf if end is None else end))
+            inside = (time[part] >= (start or 0.0)) & (
+                time[part] <= (np.inf if end is None else end)
+            )
             if inside.any():
                 yield {name: rows[part][inside] for name, rows in self._rows.items()}
 
@@ -127,3 +129,31 @@ def test_a_target_of_the_wrong_length_is_refused() -> None:
     check = Check(name="x", signal="truth.rate", below=1, target=[1, 2])
     with pytest.raises(InputError, match=r"checks\.0\.target: 2 numbers, truth\.rate has 3"):
         refuse_unknown([check], Tape.topics)
+
+
+SMALL = Event(name="small", signal="truth.error", below=1.5, above=0.0)  # first at 0.3 s
+LOW = Event(name="low", signal="truth.error", below=0.7, above=0.0)  # first at 0.4 s
+NEVER = Event(name="never", signal="truth.error", above=10.0)
+
+
+@pytest.mark.parametrize(
+    ("window", "value"),
+    [
+        ({"until": "low"}, 1.0),
+        ({"since": "low"}, 0.25),
+        ({"since": "low", "end": 0.05}, 0.5),
+        ({"since": "low", "start": 0.1}, 0.25),
+        ({"until": "small"}, 2.0),
+        ({"since": "small", "until": "low"}, 1.0),
+        ({"since": "never"}, np.nan),
+        ({"until": "never"}, np.nan),
+        ({"until": "never", "end": 0.1}, np.nan),
+    ],
+)
+def test_windows_are_counted_from_events(window: dict[str, str], value: float) -> None:
+    check = Check.model_validate(
+        {"name": "x", "signal": "truth.error", "statistic": "final", "below": 9.0} | window
+    )
+    verdict = judge(Tape(ERROR, RATE), [check], [SMALL, LOW, NEVER])[0]
+    assert verdict.measured == pytest.approx(value, nan_ok=True)
+    assert verdict.passed is not np.isnan(value)

@@ -52,6 +52,11 @@ def test_each_entry_is_told_once_with_its_value() -> None:
     assert told(LOW) == LINES
 
 
+def test_other_signals_are_shown_with_it() -> None:
+    shown = LOW.model_copy(update={"shows": ["truth.rate", "truth.rate[2]"]})
+    assert told(shown)[1][3] == "low: truth.error = 0.5; truth.rate = 6 0 8; truth.rate[2] = 8"
+
+
 def test_wherever_the_blocks_end() -> None:
     for end in range(1, 5):
         assert told(LOW, slice(0, end), slice(end, 5)) == LINES
@@ -89,3 +94,9 @@ def test_a_flight_tells_the_same_alone_and_in_a_batch() -> None:
         events = [event for b in blocks for event in b.events if event[1] == 0]
         told.append([event for event in events if "slower" in event[3]])
     assert told[0] == told[1] != []
+
+
+def test_a_check_of_no_event_is_refused() -> None:
+    late = 'checks=[{name="x", signal="truth.rate", below=1.0, since="touchdown"}]'
+    with pytest.raises(InputError, match=r"checks\.0\.since: no event 'touchdown' in events: \[\]"):
+        load("contraction-ideal", [late])
