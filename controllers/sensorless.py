@@ -7,6 +7,8 @@ acceleration that nobody told it of. As complex numbers in the stator's axes, wi
 
     L i' = -R i + u - e,    e = j k_m W exp(j p theta).
 
+From step to step the voltage is held in these axes, and the back-EMF turns on.
+
 The paper leaves speed control without a mechanical sensor to later work; this observer is ours. A
 rotor at rest has no back-EMF: it is for wheels that spin, not for gimbals.
 """
@@ -60,7 +62,7 @@ class SpeedObserver:
         """Return the memory (..., m, 7) as of now.
 
         ``current`` (..., m, 2) is measured in the windings now [A], ``voltage`` (..., m, 2) was
-        applied to them since the last step, as its mean [V]; both in the stator's axes (a, b).
+        held on them since the last step [V]; both in the stator's axes (a, b).
         ``acceleration`` (..., m) is what is known of the rotor's, k_m I_q / J for one [rad/s^2].
         """
         after: Array = _observe.ufunc(memory, current, voltage, acceleration, self._gains)
@@ -73,11 +75,46 @@ class SpeedObserver:
         b = (1.0 - a) / R
         # The poles of each error at one place: quick for the currents, slower for the angle.
         d, c = (np.exp(-T * np.asarray(w)) for w in (self.bandwidth, self.tracking_bandwidth))
-        rows = (self.pole_pairs, a, b, T)
+        rows = (self.pole_pairs, a, b, T, R, L)
         corrections = (1.0 - d * d / a, (1.0 - d) ** 2 / b)
         tracking = (1.0 - c**3, 1.5 * (1.0 - c) ** 2 * (1.0 + c) / T, (1.0 - c) ** 3 / T**2)
         columns = np.broadcast_arrays(*(np.atleast_1d(v) for v in (*rows, *corrections, *tracking)))
         return np.stack(columns).astype(float)
+
+
+def turned(vector: Array, angle: Array) -> Array:
+    """Return currents or voltages (..., m, 2) turned by an ``angle`` (..., m) [rad]."""
+    after: Array = _turned.ufunc(vector, angle)
+    return after
+
+
+def held_in_stator(voltage: Array, angle: Array, swept: Array) -> Array:
+    """Return the windings' voltages (..., m, 2) that stand for one that turns with the rotor.
+
+    ``voltage`` (..., m, 2) is wanted in the rotor's axes, which are at the electrical ``angle``
+    (..., m) [rad] now and will be ``swept`` (..., m) further when the period ends: held in the
+    stator's axes at their middle, and as much longer as its mean in theirs would be too short.
+    """
+    after: Array = _held.ufunc(voltage, angle, swept)
+    return after
+
+
+@guvectorize(["void(f8[:,:],f8[:],f8[:,:])"], "(m,k),(m)->(m,k)", cache=True)
+def _turned(vector: Any, angle: Any, after: Any) -> None:
+    for n in range(angle.size):
+        turn = complex(np.cos(angle[n]), np.sin(angle[n]))
+        there = complex(vector[n, 0], vector[n, 1]) * turn
+        after[n, 0], after[n, 1] = there.real, there.imag
+
+
+@guvectorize(["void(f8[:,:],f8[:],f8[:],f8[:,:])"], "(m,k),(m),(m)->(m,k)", cache=True)
+def _held(voltage: Any, angle: Any, swept: Any, after: Any) -> None:
+    for n in range(angle.size):
+        half = 0.5 * swept[n]
+        length = half / np.sin(half) if half != 0.0 else 1.0
+        middle = complex(np.cos(angle[n] + half), np.sin(angle[n] + half))
+        there = complex(voltage[n, 0], voltage[n, 1]) * middle * length
+        after[n, 0], after[n, 1] = there.real, there.imag
 
 
 @guvectorize(
@@ -91,31 +128,34 @@ def _observe(
     """Predict over the last period, then correct by what is measured now."""
     for n in range(memory.shape[0]):
         p, a, b, period = gains[0, n], gains[1, n], gains[2, n], gains[3, n]
+        R, L = gains[4, n], gains[5, n]
         i = complex(memory[n, 0], memory[n, 1])
         e = complex(memory[n, 2], memory[n, 3])
         angle, untold = memory[n, 4], memory[n, 6]
         grown = period * (acceleration[n] + untold)
         speed = memory[n, 5] + 0.5 * grown  # in the middle of the period
 
-        half = complex(np.cos(0.5 * p * speed * period), np.sin(0.5 * p * speed * period))
-        i = a * i + b * (complex(voltage[n, 0], voltage[n, 1]) - e * half)
-        e = e * half * half
+        swept = p * speed * period
+        turn = complex(np.cos(swept), np.sin(swept))
+        i = a * i + b * complex(voltage[n, 0], voltage[n, 1])
+        i -= e * (turn - a) / complex(R, p * speed * L)  # the voltage is held, the back-EMF turns
+        e = e * turn
         sure = abs(speed) > abs(grown)
         e *= 1.0 + (grown if sure else 0.0) / (speed if sure else 1.0)  # as the speed grows
-        angle += p * speed * period
+        angle += swept
         speed += 0.5 * grown
 
         missed = complex(current[n, 0], current[n, 1]) - i
-        i += gains[4, n] * missed
-        e -= gains[5, n] * missed
+        i += gains[6, n] * missed
+        e -= gains[7, n] * missed
 
         # e = j k_m W exp(j angle): its part along exp(j angle) shows the angle's error.
         cos, sin = np.cos(angle), np.sin(angle)
         along, across = e.real * cos + e.imag * sin, e.imag * cos - e.real * sin
         ahead = -np.arctan2(along, across) if speed > 0.0 else -np.arctan2(-along, -across)
-        angle += gains[6, n] * ahead
-        speed += gains[7, n] * ahead / p
-        untold += gains[8, n] * ahead / p
+        angle += gains[8, n] * ahead
+        speed += gains[9, n] * ahead / p
+        untold += gains[10, n] * ahead / p
         angle -= 2.0 * np.pi * np.floor(angle / (2.0 * np.pi) + 0.5)
         after[n, 0], after[n, 1], after[n, 2], after[n, 3] = i.real, i.imag, e.real, e.imag
         after[n, 4], after[n, 5], after[n, 6] = angle, speed, untold

@@ -26,9 +26,11 @@ def of(model: Any, wheels: int, driven: Collection[str], *, engine: bool = False
     if engine:
         motors, drives = _engine(model), list(ENGINE[:2])
     gimbals = [name for name in drives if not name.endswith("wheel")]
-    spun = [*reaction_wheels, *(name for name in drives if name not in gimbals)]
+    driven_wheels = [name for name in drives if name not in gimbals]
+    spun = [*reaction_wheels, *driven_wheels]
     return {
         "wheel_dof": _where(model.joint(name).dofadr for name in spun),
+        "wheel_qpos": _where(model.joint(name).qposadr for name in driven_wheels),
         "gimbal_dof": _where(model.joint(name).dofadr for name in gimbals),
         "gimbal_qpos": _where(model.joint(name).qposadr for name in gimbals),
         "drive_dof": _where(model.joint(name).dofadr for name in drives),

@@ -27,7 +27,8 @@ class Measurement(NamedTuple):
     gimbal_rate: Array = np.zeros(0)
     """Gimbal rates relative to what carries them [rad/s], shape (..., g)."""
     current: Array = np.zeros(0)
-    """(I_d, I_q) of each motor that has an electrical side [A], shape (..., m, 2)."""
+    """(I_d, I_q) of each motor that has an electrical side [A], shape (..., m, 2); its windings'
+    currents where the drive works in the stator's axes."""
     position: Array = np.zeros(0)
     """Of the bus, inertial axes [m], shape (..., 3)."""
     velocity: Array = np.zeros(0)
@@ -45,6 +46,9 @@ class Measurement(NamedTuple):
     """Left in the tank [kg], shape (..., 1)."""
     contact: Array = np.zeros(0)
     """1.0 while at least two feet stand on the ground, else 0.0, shape (..., 1)."""
+    wheel_angle: Array = np.zeros(0)
+    """Angles of the wheels with an electrical side, relative to what carries them [rad], shape
+    (..., n)."""
 
 
 class Reference(NamedTuple):
@@ -90,7 +94,8 @@ class VoltageCommand(NamedTuple):
     """What an inner loop asks of the motors' inverters."""
 
     voltage: Array
-    """(u_d, u_q) of each motor, in the rotor's axes [V], shape (..., m, 2)."""
+    """(u_d, u_q) of each motor, in the rotor's axes [V], shape (..., m, 2); in the stator's, the
+    two windings', where the drive works in those."""
 
 
 class ThrustCommand(NamedTuple):

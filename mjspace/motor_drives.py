@@ -42,8 +42,9 @@ class MotorDrives:
     ) -> tuple[State, Array, Array]:
         """Return (state, mean torque of the step [N m], whether the voltage was cut)."""
         speed = np.concatenate([truth.gimbal_rate, truth.wheel_speed], axis=-1)[..., self.order]
+        angle = np.concatenate([truth.gimbal_angle, truth.wheel_angle], axis=-1)[..., self.order]
         current, torque, applied = self.drives.advance(
-            state["current"], command.voltage, speed, step
+            state["current"], command.voltage, speed, step, angle
         )
         cut = (applied != command.voltage).any(axis=-1)
         return {"current": current}, torque, cut

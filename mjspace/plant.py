@@ -36,6 +36,8 @@ class Vehicle:
     """Axial inertia of each rotor [kg m^2], shape (n,)."""
     wheel_dof: Any
     """Index of each wheel's speed in ``qvel``, shape (n,): reaction wheels, then driven ones."""
+    wheel_qpos: Any
+    """Index of each driven wheel's angle in ``qpos``, shape (d,)."""
     gimbal_dof: Any
     """Index of each driven gimbal's rate in ``qvel``, shape (g,)."""
     gimbal_qpos: Any

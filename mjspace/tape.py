@@ -60,6 +60,7 @@ class Columns:
         self.wheel_speed = _columns(before_qvel + vehicle.wheel_dof)
         self.gimbal_angle = _columns(before_qpos + vehicle.gimbal_qpos)
         self.gimbal_rate = _columns(before_qvel + vehicle.gimbal_dof)
+        self.wheel_angle = _columns(before_qpos + vehicle.wheel_qpos)
         self.struts = _columns(before_qpos + vehicle.strut_qpos)
         self.has_legs = len(vehicle.strut_qpos) > 0
         sensors = assembly.scenario.sensors
@@ -74,7 +75,7 @@ class Columns:
             physics[..., self.wheel_speed],
             physics[..., self.gimbal_angle],
             physics[..., self.gimbal_rate],
-            *[nothing] * 9,
+            *[*[nothing] * 9, physics[..., self.wheel_angle]],
         )
         if self.has_legs:
             standing = np.sum(physics[..., self.struts] > PRESSED, axis=-1, keepdims=True) >= 2

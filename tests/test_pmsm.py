@@ -142,25 +142,49 @@ def test_a_speed_that_changes_costs_the_order_that_is_said(within: float, order:
     assert fitted == pytest.approx(order, abs=0.05)
 
 
+def windings(t: float, y: Any, u: Any, theta: float, W: float) -> list[float]:
+    """Return the slopes of the wheel's windings' currents and the torque, (2.67)-(2.69)."""
+    p, R, L, km = WHEEL.pole_pairs, WHEEL.resistance, WHEEL.inductance, WHEEL.torque_constant
+    sin, cos = np.sin(p * (theta + W * t)), np.cos(p * (theta + W * t))
+    return [
+        (-R * y[0] + km * W * sin + u[0]) / L,
+        (-R * y[1] - km * W * cos + u[1]) / L,
+        km * (-y[0] * sin + y[1] * cos),
+    ]
+
+
+@pytest.mark.parametrize("step", [1e-6, 1e-4, 5e-3])
+@pytest.mark.parametrize("W", [167.0, -40.0, 0.0])
+def test_a_step_of_the_windings_solves_theirs(W: float, step: float) -> None:
+    theta, u = 0.3, np.array([150.0, -290.0])
+    motors = Drives.of([GIMBAL, WHEEL.model_copy(update={"axes": "stator"})])
+    a, b, impulse = solve_ivp(
+        windings, (0.0, step), [*CURRENT[1], 0.0], args=(u, theta, W),
+        method="DOP853", rtol=1e-13, atol=1e-14,
+    ).y[:, -1]  # fmt: skip
+    speed, angle = np.array([-3.0, W]), np.array([9.0, theta])
+    current, torque, _ = motors.advance(CURRENT, np.array([VOLTAGE[0], u]), speed, step, angle)
+    # 1e-12 at most: the integrator's own
+    np.testing.assert_allclose(current[1], [a, b], rtol=1e-11, atol=1e-11)
+    assert torque[1] == pytest.approx(impulse / step, rel=1e-11)
+    # a motor beside it works in its rotor's axes as ever
+    other, given, _ = DRIVES.advance(CURRENT, VOLTAGE, SPEED, step)
+    assert current[0].tobytes() == other[0].tobytes()
+    assert torque[0] == given[0]
+
+
 def test_park_gives_the_windings_currents() -> None:
     """(2.68), (2.69), of the windings, integrated as they are, against (d, q) transformed."""
     W, step, theta = 50.0, 2e-3, 0.3
-    p, R, L, km = 6, 3.0, 6e-3, 2.0
     motor = Drives.of([WHEEL])
     u = np.array([[-3.0, 110.0]])
 
-    def windings(t: float, y: np.ndarray) -> list[float]:
-        angle = np.array([theta + W * t])
-        u_a, u_b = motor.to_stator(u, angle)[0]
-        sin, cos = np.sin(p * angle[0]), np.cos(p * angle[0])
-        torque = km * (-y[0] * sin + y[1] * cos)  # (2.67)
-        return [
-            (-R * y[0] + km * W * sin + u_a) / L, (-R * y[1] - km * W * cos + u_b) / L, torque
-        ]  # fmt: skip
+    def slopes_at(t: float, y: np.ndarray) -> list[float]:
+        return windings(t, y, motor.to_stator(u, np.array([theta + W * t]))[0], theta, W)
 
     start = motor.to_stator(CURRENT[1:], np.array([theta]))[0]
     a, b, impulse = solve_ivp(
-        windings, (0.0, step), [*start, 0.0], method="DOP853", rtol=1e-13, atol=1e-14
+        slopes_at, (0.0, step), [*start, 0.0], method="DOP853", rtol=1e-13, atol=1e-14
     ).y[:, -1]
     current, torque, _ = motor.advance(CURRENT[1:], u, np.array([W]), step)
     found = motor.to_stator(current, np.array([theta + W * step]))[0]

@@ -48,7 +48,7 @@ class Flight(NamedTuple):
 def bench(loop: SpeedLoop, motors: int, every: int, duration: float) -> Flight:
     """Fly motors after 20 sin(pi t/2): currents at 10 kHz, speeds at every ``every``-th period."""
     inner = CurrentLoop(np.full(motors, P), R, L, KM, STEP, KEP)
-    drives = Drives(*(np.full(motors, value) for value in (P, R, L, KM, np.inf)))
+    drives = Drives(*(np.full(motors, value) for value in (P, R, L, KM, np.inf, 0.0)))
     rows = round(duration / STEP)
     time = STEP * np.arange(rows)
     lag = 1.0 / KEP + 0.5 * (every - 1) * STEP
@@ -127,7 +127,7 @@ def driven(
     loop: CurrentLoop, wanted: Any, speed: Any, periods: int, limit: float = np.inf
 ) -> np.ndarray:
     """Return the currents (n, m, 2) at held speeds; ``wanted`` is a function of time."""
-    motors = Drives(*MOTORS, CONSTANTS, np.full(3, limit))
+    motors = Drives(*MOTORS, CONSTANTS, np.full(3, limit), np.zeros(3))
     current, integral, rows = motors.reset(), loop.reset(speed), []
     for k in range(periods):
         rows.append(current)

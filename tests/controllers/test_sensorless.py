@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from mjspace.controllers.motor_loops import CurrentLoop, SpeedLoop
-from mjspace.controllers.sensorless import SpeedObserver
+from mjspace.controllers.sensorless import SpeedObserver, held_in_stator, turned
 
 from mjspace.contract import Array
 from mjspace.pmsm import Drives
@@ -25,30 +25,23 @@ class Flight(NamedTuple):
     """Wanted less true speed [rad/s]."""
 
 
-def turned(vector: Array, angle: Array) -> Array:
-    """Return vectors (..., 2) turned by an angle."""
-    turned = (vector[..., 0] + 1j * vector[..., 1]) * np.exp(1j * angle)
-    return np.stack([turned.real, turned.imag], axis=-1)
-
-
 def fly(believed: float, angle: float, closed: bool, sign: float = 1.0) -> Flight:
     """Fly a wheel about 100 rad/s with the vibration of ch. 5; ``closed``, on what is observed.
 
     ``believed`` is the observer's first speed, ``angle`` the rotor's, of which it knows nothing.
     """
-    motor = Drives(*(np.array([value]) for value in (P, R, L, KM, np.inf)))
+    motor = Drives(*(np.array([value]) for value in (P, R, L, KM, np.inf, 1.0)))
     observer, inner = SpeedObserver(P, R, L, KM, STEP), CurrentLoop(P, R, L, KM, STEP)
     outer = SpeedLoop(
         J, KM, STEP, 0.32, observer_gain=1.0, vibration_gain=5.0, adaptation_gain=1.0, lead=1 / 3e3
     )
     speed, theta, none = np.array([100.0 * sign]), np.array([angle]), np.zeros(1)
     seen, memory = observer.reset(np.array([believed * sign])), outer.reset(speed)
-    current, integral, voltage = motor.reset(), inner.reset(speed), np.zeros((1, 2))
+    windings, integral, voltage = motor.reset(), inner.reset(speed), np.zeros((1, 2))
     time, rows = STEP * np.arange(ROWS), []
     wanted = sign * (100.0 + 20.0 * np.sin(3.0 * time))
     slope = sign * 60.0 * np.cos(3.0 * (time + 1.0 / 3e3))
     for k in range(ROWS):
-        windings = motor.to_stator(current, theta)
         if k:
             told = KM / J * turned(windings, -seen[:, 4])[:, 1]
             seen = observer.step(seen, windings, voltage, told)
@@ -58,10 +51,8 @@ def fly(believed: float, angle: float, closed: bool, sign: float = 1.0) -> Fligh
         integral, applied = inner.step(integral, dq, asked, rate)
         off = np.angle(np.exp(1j * (seen[0, 4] - P * theta[0])))
         rows.append((seen[0, 5] - speed[0], off, wanted[k] - speed[0]))
-        # The inverter turns its vector with the rotor that it believes in; the mean over a period.
-        swept = 0.5 * P * rate * STEP
-        voltage = turned(applied, frame + swept) * np.sinc(swept / np.pi)[:, None]
-        current, torque, _ = motor.advance(current, turned(applied, frame - P * theta), speed, STEP)
+        voltage = held_in_stator(applied, frame, P * rate * STEP)
+        windings, torque, _ = motor.advance(windings, voltage, speed, STEP, theta)
         theta = theta + STEP * (speed + 0.5 * STEP * torque / J)
         speed = speed + STEP * (torque + 0.35 * np.cos(0.5 * theta + 3.0)) / J
     return Flight(*np.array(rows).T)
