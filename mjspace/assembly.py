@@ -19,7 +19,7 @@ from mjspace.one_by_one import OneByOne
 from mjspace.plant import Vehicle
 from mjspace.scenario import Component, Scenario
 from mjspace.sensors import SensorSuite
-from mjspace.tables import PlantTable, Wheels
+from mjspace.tables import PlantTable
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
     Raises:
         InputError: a part cannot be built, with the scenario's key and what would be right.
     """
-    friction = _friction(scenario.plant.wheels)
+    friction = _friction(scenario.plant)
     ripple = scenario.plant.ripple
     size = environment.userdata_size(scenario.environment, friction, ripple)
     vehicle = _part("plant", partial(plant.build, userdata=size), scenario.plant, scenario.rates)
@@ -147,10 +147,11 @@ def _actuators(vehicle: Vehicle, table: PlantTable) -> Actuators:
     return ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit)
 
 
-def _friction(wheels: Wheels) -> dict[str, float]:
-    if not wheels.coulomb_friction:
-        return {}
-    return {f"wheel_{i}": wheels.coulomb_friction for i in range(len(wheels.axes))}
+def _friction(table: PlantTable) -> dict[str, float]:
+    """Return the Coulomb friction of the hinges that have some, by name."""
+    wheels = {f"wheel_{i}": table.wheels.coulomb_friction for i in range(len(table.wheels.axes))}
+    every = wheels | {name: hinge.coulomb_friction for name, hinge in table.hinges.items()}
+    return {name: torque for name, torque in every.items() if torque}
 
 
 def _part(key: str, build: Callable[..., Any], *arguments: Any) -> Any:

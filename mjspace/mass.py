@@ -1,13 +1,14 @@
 """Mass properties: a rotor's inertia, and what the wheels leave of the vehicle's for the bus."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from mjspace.contract import Array
+from mjspace.hinge_tables import Bearing
 from mjspace.tables import PlantTable, Wheels
 
 
@@ -34,10 +35,6 @@ def unit_axes(wheels: Wheels) -> Array:
 def rotor(wheels: Wheels) -> Inertial:
     """Return the mass properties of each rotor, its spin axis along z.
 
-    Static imbalance is an offset of the mass along x. Dynamic imbalance is a tilt of the principal
-    axes about y that gives the wanted product of inertia between z and x; the rotor is still one
-    that can be made.
-
     Raises:
         ValueError: no rotor has that transverse inertia, or so large a product of inertia.
     """
@@ -47,19 +44,51 @@ def rotor(wheels: Wheels) -> Inertial:
             f"plant.wheels.transverse_inertia: {transverse:g} kg m^2 is less than half the axial "
             f"{axial:g} kg m^2: no rotor has that"
         )
-    most = (axial - transverse) / 2.0  # at a tilt of 45 degrees
-    if wheels.dynamic_imbalance > abs(most):
-        raise ValueError(
-            f"plant.wheels.dynamic_imbalance: {wheels.dynamic_imbalance:g} kg m^2 is more than a "
-            f"tilt of this rotor can give: {abs(most):g} kg m^2"
-        )
-    tilt = np.arcsin(wheels.dynamic_imbalance / most) / 2.0 if wheels.dynamic_imbalance else 0.0
-    return Inertial(
+    balanced = Inertial(
         wheels.mass,
-        np.array([wheels.static_imbalance / wheels.mass, 0.0, 0.0]),
+        np.zeros(3),
         np.array([transverse, transverse, axial]),
-        np.array([np.cos(tilt / 2.0), 0.0, np.sin(tilt / 2.0), 0.0]),
+        np.array([1.0, 0.0, 0.0, 0.0]),
     )
+    return off_balance(balanced, np.array([0.0, 0.0, 1.0]), wheels, "plant.wheels")
+
+
+def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Inertial:
+    """Return the mass properties of a body that turns about ``axis`` (3,), a unit vector, with the
+    imbalance of its ``bearing``.
+
+    Static imbalance is an offset of the mass across the axis, dynamic imbalance a product of
+    inertia between the axis and that offset's direction. The axial inertia stays, and so does the
+    transverse one, but for a rotor so flat that its mass has to reach along the axis to be askew.
+
+    Raises:
+        ValueError: so large a product of inertia that it would change the transverse inertia by
+            more than a hundredth; ``key`` is the bearing's in the scenario.
+    """
+    largest = int(np.argmax(np.abs(axis)))
+    across = np.eye(3)[(largest + 1) % 3]
+    across = across - (across @ axis) * axis
+    across /= np.linalg.norm(across)
+    body = body._replace(ipos=body.ipos + bearing.static_imbalance / body.mass * across)
+    if not bearing.dynamic_imbalance:
+        return body
+    frame = np.stack([axis, across, np.cross(axis, across)])
+    inertia = frame @ tensor(body.inertia, body.iquat) @ frame.T
+    # Second moments of the mass, which any body has that are positive semidefinite.
+    spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    spread[0, 1] = spread[1, 0] = spread[0, 1] - bearing.dynamic_imbalance
+    need = spread[0, 1:] @ np.linalg.solve(spread[1:, 1:], spread[0, 1:])
+    allowed = spread[0, 0] + 0.01 * inertia[1, 1]
+    if need > allowed:
+        most = bearing.dynamic_imbalance * np.sqrt(allowed / need)
+        raise ValueError(
+            f"{key}.dynamic_imbalance: {bearing.dynamic_imbalance:g} kg m^2 is more than what "
+            f"turns there can have: {most:.3g} kg m^2"
+        )
+    spread[0, 0] = max(spread[0, 0], need + 1e-9 * inertia[1, 1])  # rounding must not undo it
+    askew = np.trace(spread) * np.eye(3) - spread
+    moments, iquat = principal(frame.T @ askew @ frame)
+    return body._replace(inertia=moments, iquat=iquat)
 
 
 def bus(table: PlantTable, own: Array) -> tuple[Inertial, Array]:
@@ -89,7 +118,22 @@ def bus(table: PlantTable, own: Array) -> tuple[Inertial, Array]:
         inertia = gyrostat - across - offsets
         if np.linalg.eigvalsh(inertia)[0] <= 0.0:
             raise ValueError(_too_much(inertia, gyrostat - offsets, across, wheels))
-    return _inertial(table.mass, centre, inertia), gyrostat
+    return Inertial(table.mass, centre, *principal(inertia)), gyrostat
+
+
+def principal(inertia: Array) -> tuple[Array, Array]:
+    """Return the principal moments (3,), ascending, and axes (4,) of an inertia matrix (3, 3)."""
+    moments, axes = np.linalg.eigh(inertia)
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # right-handed
+    return moments, Rotation.from_matrix(axes).as_quat(scalar_first=True)
+
+
+def own_inertia(body: Any) -> Array:
+    """Return the inertia matrix (3, 3) [kg m^2] that a body of an ``MjSpec`` has of itself."""
+    if np.isnan(body.fullinertia[0]):
+        return tensor(body.inertia, body.iquat)
+    xx, yy, zz, xy, xz, yz = body.fullinertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inertial:
@@ -115,14 +159,7 @@ def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inert
             f"plant.vehicle_inertia leaves a bus with the eigenvalues {eigenvalues} kg m^2: more "
             "inertia or less on the parts would do"
         )
-    return _inertial(left, centre, own)
-
-
-def _inertial(mass: float, centre: Array, inertia: Array) -> Inertial:
-    values, principal = np.linalg.eigh(inertia)
-    principal[:, 2] = np.cross(principal[:, 0], principal[:, 1])  # right-handed
-    quaternion = Rotation.from_matrix(principal).as_quat(scalar_first=True)
-    return Inertial(mass, centre, values, quaternion)
+    return Inertial(left, centre, *principal(own))
 
 
 def tensor(inertia: Array, iquat: Array) -> Array:

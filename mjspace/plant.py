@@ -81,7 +81,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
         gyrostat = np.array(table.vehicle_inertia)
         inertial = mass.remainder(table.vehicle_mass, gyrostat, _others(spec))
     else:
-        inertial, gyrostat = mass.bus(table, _own_inertia(spec.body("bus")))
+        inertial, gyrostat = mass.bus(table, mass.own_inertia(spec.body("bus")))
     model = _compile(spec, inertial)
     guards.check(model)
 
@@ -211,14 +211,6 @@ def _others(spec: Any) -> list[mass.Inertial]:
             moments = model.body_inertia[body].copy()
             others.append(mass.Inertial(float(model.body_mass[body]), place, moments, quat))
     return others
-
-
-def _own_inertia(body: Any) -> Array:
-    """Return the inertia matrix (3, 3) [kg m^2] of the bus as its model has it."""
-    if np.isnan(body.fullinertia[0]):
-        return mass.tensor(body.inertia, body.iquat)
-    xx, yy, zz, xy, xz, yz = body.fullinertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:

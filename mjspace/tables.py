@@ -24,6 +24,7 @@ from mjspace.fields import (
     Unit3,
     Velocity3,
 )
+from mjspace.hinge_tables import Bearing, Hinge
 from mjspace.landing_tables import Engine, Ground
 from mjspace.quantity import whole_number
 
@@ -44,7 +45,7 @@ class Rates(Table):
         return whole_number(self.control, self.physics, "rates.control", "rates.physics")
 
 
-class Wheels(Table):
+class Wheels(Bearing):
     """Reaction wheels: one for each axis; every wheel is alike."""
 
     axes: list[Unit3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -61,14 +62,6 @@ class Wheels(Table):
     """Largest motor torque; none when left out."""
     speed_limit: Annotated[Positive, Si("rad/s")] | None = None
     """Largest speed relative to the bus; at it the motor gives no torque that would raise it."""
-    viscous_friction: Annotated[NonNegative, Si("N m s/rad")] = 0.0
-    """Bearing torque for each rad/s."""
-    coulomb_friction: Annotated[NonNegative, Si("N m")] = 0.0
-    """Bearing torque at any speed, smoothed through zero: c tanh(speed / 0.1 rad/s)."""
-    static_imbalance: Annotated[NonNegative, Si("kg m")] = 0.0
-    """Rotor mass times its centre's offset from the spin axis."""
-    dynamic_imbalance: Annotated[NonNegative, Si("kg m^2")] = 0.0
-    """Product of inertia between the spin axis and a transverse one."""
 
     @model_validator(mode="after")
     def _alike(self) -> "Wheels":
@@ -125,6 +118,8 @@ class PlantTable(Table):
     parts: dict[Name, Part] = {}
     """By a name of one's own: ``[plant.parts.damper]``. They add to the bus's mass and inertia, and
     to neither ``gyrostat_inertia`` nor the ``inertia`` that a law is given."""
+    hinges: dict[Name, Hinge] = {}
+    """Bearings of the parts' hinges, by the hinge: ``[plant.hinges.cmg_wheel]``."""
     drives: dict[Name, Pmsm] = {}
     """Electric motors that turn hinges of the parts, by the hinge: ``[plant.drives.cmg_outer]``. A
     hinge whose name ends in ``wheel`` is a wheel, any other a gimbal."""

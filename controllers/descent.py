@@ -1,0 +1,148 @@
+"""Wanted descents to a landing site on the Moon, and the attitude that thrust along them needs.
+
+World axes: x and y in the landing plane, z up, the origin on the site; (x, y, z) are (Y, Z, X) of
+paper 003 (CNCA 2019), less the Moon's radius on X, and so are the body axes: z along the thrust.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from mjspace import attitude as att
+from mjspace.contract import Array, Trajectory, gain
+
+
+@dataclass(frozen=True)
+class Descent(ABC):
+    """From ``height`` and ``reach`` to the site along one shape, then a hover, then down.
+
+    The wanted attitude is the paper's: z along the thrust that the wanted motion needs against
+    gravity, tilted by gamma_d in the vertical plane of ``azimuth``, and the body's y normal to it.
+    Its rate is that of the attitude; the paper takes it as zero.
+    """
+
+    duration: float = gain("s")
+    """T, of the shape."""
+    height: float = gain("m", default=1000.0)
+    """At the start, above where the shape ends."""
+    reach: float = gain("m", default=2500.0)
+    """At the start, along the landing plane."""
+    azimuth: float = gain("rad", default=0.6435)
+    """theta_d: of the vertical plane, from x towards y."""
+    clearance: float = gain("m", default=0.0)
+    """How high the shape ends; the start is as much higher. In the paper: on the ground."""
+    hover: float = gain("s", default=0.0)
+    """How long it stays there."""
+    descent_speed: float = gain("m/s", default=0.5)
+    """Afterwards, without end: what touches down has to notice it."""
+    stance: float = gain("m", default=1.8)
+    """Of the vehicle's origin above the ground when it stands."""
+    gravity_parameter: float = gain("m^3/s^2", default=4.902e12)
+    """mu of the Moon."""
+    moon_radius: float = gain("m", default=1.738e6)
+    """Of the landing plane, tangent there."""
+
+    def __post_init__(self) -> None:
+        if not self.duration > 0.0:
+            raise ValueError(f"duration is {self.duration:g} s: more than zero would do")
+
+    @abstractmethod
+    def shape(self, s: Array) -> list[Array]:
+        """Return what is left of the way, 1 to 0, and its first four derivatives by ``s`` (n,)."""
+
+    def at(self, time: Array) -> Trajectory:
+        """Return the descent at each ``time`` [s]."""
+        start = np.array([np.cos(self.azimuth), np.sin(self.azimuth), 0.0]) * self.reach
+        start[2] = self.height
+        late = time - self.duration
+        left = self.shape(np.clip(time / self.duration, 0.0, 1.0))
+        motion = [
+            np.where(late <= 0.0, part / self.duration**n, 0.0)[:, None] * start
+            for n, part in enumerate(left)
+        ]
+        down = np.maximum(late - self.hover, 0.0)
+        motion[0][:, 2] += self.clearance + self.stance - self.descent_speed * down
+        motion[1][down > 0.0, 2] -= self.descent_speed
+        return powered(motion, self.azimuth, self.gravity_parameter, self.moon_radius)
+
+
+@dataclass(frozen=True)
+class SineDescent(Descent):
+    """1 - sin(pi t / 2T), table 2 of paper 003; it ends with an acceleration of 0.166 m/s^2.
+
+    T is printed nowhere (erratum 18): 200 s fits the figures' time axis.
+    """
+
+    duration: float = gain("s", default=200.0)
+
+    def shape(self, s: Array) -> list[Array]:
+        """Return 1 - sin(pi s / 2) and its derivatives."""
+        a = 0.5 * np.pi
+        sine, cosine = np.sin(a * s), np.cos(a * s)
+        return [1.0 - sine, -a * cosine, a**2 * sine, a**3 * cosine, -(a**4) * sine]
+
+
+@dataclass(frozen=True)
+class CubicDescent(Descent):
+    """(1 - t/T)^3, ours: it starts at the printed velocities and ends without acceleration."""
+
+    duration: float = gain("s", default=300.0)
+
+    def shape(self, s: Array) -> list[Array]:
+        """Return (1 - s)^3 and its derivatives."""
+        left = 1.0 - s
+        return [left**3, -3.0 * left**2, 6.0 * left, np.full_like(s, -6.0), np.zeros_like(s)]
+
+
+def powered(
+    motion: list[Array], azimuth: float, gravity_parameter: float, moon_radius: float
+) -> Trajectory:
+    """Return a motion with the attitude, rate and acceleration that its thrust needs.
+
+    ``motion`` is the position and its first four derivatives, world axes, each (n, 3) [m/s^k]. The
+    attitude turns by ``azimuth`` [rad] about z, then the shortest way from z to the thrust: with
+    thrust in that vertical plane it is psi = theta_d, phi = 0, gamma = gamma_d of paper 003.
+    """
+    position, velocity, acceleration = motion[:3]
+    thrust = _specific_force(motion, gravity_parameter, moon_radius)
+    ahead, aside = np.cos(azimuth), np.sin(azimuth)
+    turned = np.array([[ahead, -aside, 0.0], [aside, ahead, 0.0], [0.0, 0.0, 1.0]])
+    f, df, ddf = (part @ turned for part in thrust)
+
+    size = np.linalg.norm(f, axis=-1)
+    dsize = _dot(f, df) / size
+    ddsize = (_dot(df, df) + _dot(f, ddf) - dsize**2) / size
+    # Not of unit length: its rate is 2 (Q* Q')_v / |Q|^2 all the same.
+    Q, dQ, ddQ = (
+        np.stack([along + part[:, 2], -part[:, 1], part[:, 0], 0.0 * along], axis=-1)
+        for along, part in ((size, f), (dsize, df), (ddsize, ddf))
+    )
+    square = _dot(Q, Q)[:, None]
+    rate = 2.0 * att.multiply(att.conjugate(Q), dQ)[:, 1:] / square
+    growth = 2.0 * _dot(Q, dQ)[:, None] / square
+    spin = 2.0 * att.multiply(att.conjugate(Q), ddQ)[:, 1:] / square - growth * rate
+    yaw = att.from_rotation_vector(np.array([0.0, 0.0, azimuth]))
+    attitude = att.multiply(yaw, att.normalize(Q))
+    return Trajectory(attitude, rate, spin, position, velocity, acceleration)
+
+
+def _specific_force(motion: list[Array], mu: float, radius: float) -> list[Array]:
+    """Return thrust over mass [m/s^2] along a motion, and its first two derivatives, (n, 3) each.
+
+    The second leaves out the change of gravity's gradient, 1e-8 m/s^4 at 30 m/s.
+    """
+    position, velocity, acceleration, jerk, snap = motion
+    p = position + np.array([0.0, 0.0, radius])
+    square = _dot(p, p)[:, None]
+    pull = mu / (square * np.sqrt(square))
+    return [
+        acceleration + pull * p,
+        jerk + pull * (velocity - 3.0 * _dot(p, velocity)[:, None] / square * p),
+        snap + pull * (acceleration - 3.0 * _dot(p, acceleration)[:, None] / square * p),
+    ]
+
+
+def _dot(a: Array, b: Array) -> Array:
+    product: Array = np.einsum("ij,ij->i", a, b)
+    return product
