@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from mjspace.checks import find_signal
 from mjspace.log_reader import Log
 from mjspace.panels import Panel
 from mjspace.scenario import Check
@@ -29,21 +30,22 @@ class Bound:
 def bounds(panel: Panel, checks: Sequence[Check], log: Log) -> Iterator[Bound]:
     """Yield the bounds that can be drawn on ``panel``.
 
-    Those of another signal cannot, nor those of an error from a target, of a vector's norm, and of
-    a drift from a later instant than the panel's.
+    Those of another signal cannot, nor those of an error from a target, of a vector's norm, in a
+    window counted from an event, and of a drift from a later instant than the panel's.
     """
-    shape = log.topics[panel.topic][panel.field]
     for check in checks:
-        name, _, rest = check.signal.removeprefix("/").partition("[")
-        component = int(rest.rstrip("]")) if rest else 0
+        topic, field, part = find_signal(log.topics, check.signal)
+        component = part.start
         is_drift = check.statistic == "drift"
         if (
-            f"/{name}" != f"{panel.topic}.{panel.field}"
-            or panel.index not in (None, component)
+            (topic, field) != (panel.topic, panel.field)
+            or panel.part not in (None, part)
             or check.target is not None
+            or check.since is not None
+            or check.until is not None
             or is_drift != panel.drift
             or (is_drift and check.start > log.start)
-            or not (rest or is_drift or shape in ((), (1,)))
+            or not (is_drift or part.stop - part.start == 1)
         ):
             continue
         end = log.end if check.end is None else min(check.end, log.end)

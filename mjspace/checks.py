@@ -57,8 +57,8 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
     """
     for number, check in enumerate(checks):
         with blamed_on(f"checks.{number}.signal"):
-            topic, field, index = find_signal(topics, check.signal)
-        size = 1 if index is not None else int(np.prod(topics[topic][field]))
+            _, _, part = find_signal(topics, check.signal)
+        size = part.stop - part.start
         count = 1 if check.target is None else np.size(check.target)
         if count not in (1, size):
             raise InputError(f"checks.{number}.target: {count} numbers, {check.signal} has {size}")
@@ -78,23 +78,29 @@ def judge(log: Log, checks: Sequence[Check], events: Sequence[Event] = ()) -> li
     return [Verdict(check, _measure(log, check, *_window(check, happened))) for check in checks]
 
 
-def find_signal(topics: Topics, signal: str) -> tuple[str, str, int | None]:
-    """Return the topic, field and index that ``signal`` (``truth.rate[0]``) names.
+def find_signal(topics: Topics, signal: str) -> tuple[str, str, slice]:
+    """Return the topic, field and components that ``signal`` names.
+
+    ``truth.rate`` is all of it, ``truth.rate[0]`` one component, ``truth.rate[0:2]`` the first two.
 
     Raises:
         ValueError: there is none, with the near names.
     """
-    match = re.fullmatch(r"/?(\w+)\.(\w+)(?:\[(\d+)\])?", signal)
+    match = re.fullmatch(r"/?(\w+)\.(\w+)(?:\[(\d+)(?::(\d+))?\])?", signal)
     if match is None:
-        raise ValueError(f"signal {signal!r}: write topic.field or topic.field[i]")
-    topic, field, index = "/" + match[1], match[2], match[3]
+        raise ValueError(
+            f"signal {signal!r}: write topic.field, topic.field[i] or topic.field[i:j]"
+        )
+    topic, field = "/" + match[1], match[2]
     names = [f"{name[1:]}.{f}" for name, fields in topics.items() for f in fields]
     if field not in topics.get(topic, {}):
         raise ValueError(f"no signal {signal!r} in the log{nearest(f'{match[1]}.{field}', names)}")
     size = int(np.prod(topics[topic][field]))
-    if index is not None and int(index) >= size:
+    start = int(match[3] or 0)
+    end = int(match[4]) if match[4] else start + 1 if match[3] else size
+    if not start < end <= size:
         raise ValueError(f"signal {signal!r}: {topic[1:]}.{field} has {size} components")
-    return topic, field, None if index is None else int(index)
+    return topic, field, slice(start, end)
 
 
 def magnitude(rows: Array) -> Array:
@@ -105,10 +111,10 @@ def magnitude(rows: Array) -> Array:
 
 def _first(log: Log, event: Event) -> float:
     """Return when the event's signal is in its region first [s]; nan if never."""
-    topic, field, index = find_signal(log.topics, event.signal)
+    topic, field, part = find_signal(log.topics, event.signal)
     for block in log.blocks(topic, [field], start=None, end=None):
         rows = block[field].reshape(len(block["time"]), -1)
-        inside = event.admits(magnitude(rows if index is None else rows[:, index : index + 1]))
+        inside = event.admits(magnitude(rows[:, part]))
         if inside.any():
             return float(block["time"][np.argmax(inside)])
     return math.nan
@@ -126,13 +132,12 @@ def _window(check: Check, happened: Mapping[str, float]) -> tuple[float, float]:
 def _measure(log: Log, check: Check, start: float, end: float) -> float:
     if math.isnan(start) or math.isnan(end):
         return math.nan
-    topic, field, index = find_signal(log.topics, check.signal)
+    topic, field, part = find_signal(log.topics, check.signal)
     target = None if check.target is None else np.asarray(check.target, dtype=float)
     count, total, peak, least, last = 0, 0.0, -np.inf, np.inf, np.nan
     first: Array | None = None
     for block in log.blocks(topic, [field], start=start, end=None if end == math.inf else end):
-        rows = block[field].reshape(len(block["time"]), -1)
-        rows = rows if index is None else rows[:, index : index + 1]
+        rows = block[field].reshape(len(block["time"]), -1)[:, part]
         if target is not None:
             rows = rows - target
         if first is None:

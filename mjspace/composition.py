@@ -131,7 +131,7 @@ def _attach_ground(spec: Any, ground: Ground) -> None:
     across = [-np.sin(ground.downhill), np.cos(ground.downhill), 0.0]
     frame = spec.worldbody.add_frame()
     mujoco.mju_axisAngle2Quat(frame.quat, np.array(across), ground.slope)
-    spec.attach(mujoco.MjSpec.from_file(str(file)), prefix="", frame=frame)
+    spec.attach(mujoco.MjSpec.from_file(str(file)), prefix="site_", frame=frame)
 
 
 def _exit(half_size: Array, axis: Array) -> float:

@@ -43,7 +43,6 @@ def with_crossings(block: Block, declared: Sequence[Event], before: Array) -> tu
 
 def _rows(block: Block, topics: Topics, signal: str) -> Array:
     """Return the signal's numbers, (n, N, k)."""
-    topic, field, index = find_signal(topics, signal)
+    topic, field, part = find_signal(topics, signal)
     rows = block.rows[topic][field]
-    rows = rows.reshape(*rows.shape[:2], -1)
-    return rows if index is None else rows[..., index : index + 1]
+    return rows.reshape(*rows.shape[:2], -1)[..., part]

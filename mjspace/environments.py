@@ -18,12 +18,12 @@ from dm_env.specs import BoundedArray
 from mjspace import attitude, dm_bridge, environment, loading
 from mjspace.actuators import ReactionWheels
 from mjspace.assembly import Assembly, assemble
+from mjspace.columns import Columns
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import InputError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.simulation import BLOCK_PERIODS
 from mjspace.start import INTEGRATION, first_start, last_period
-from mjspace.tape import Columns
 
 TOLERATED_ERROR = np.radians(1.0)
 """Attitude error [rad] that earns the full reward where no check of the scenario bounds it."""

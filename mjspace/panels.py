@@ -26,7 +26,7 @@ class Panel:
     unit: str = ""
     scale: float = 1.0
     """From SI to ``unit``."""
-    index: int | None = None
+    part: slice | None = None
     """The one component that is drawn; all when left out."""
     names: str = ""
     """Of the components, a letter each; their numbers when left out."""
@@ -95,8 +95,8 @@ def read(log: Log, panel: Panel) -> Curves:
     first: list[Array] = []
 
     def change(rows: Array) -> Array:
-        if panel.index is not None:
-            rows = rows[:, panel.index : panel.index + 1]
+        if panel.part is not None:
+            rows = rows[:, panel.part]
         if panel.drift:
             first.append(rows[0])
             rows = np.linalg.norm(rows - first[0], axis=1, keepdims=True)
@@ -109,7 +109,7 @@ def read(log: Log, panel: Panel) -> Curves:
 
 
 def _of_signal(log: Log, signal: str) -> Panel:
-    topic, field, index = find_signal(log.topics, signal)
+    topic, field, part = find_signal(log.topics, signal)
     unit = log.units.get(topic, {}).get(field, "")
     title = signal.removeprefix("law.") if topic == "/law" else signal
-    return Panel(f"Law: {title}" if topic == "/law" else title, topic, field, unit, index=index)
+    return Panel(f"Law: {title}" if topic == "/law" else title, topic, field, unit, part=part)

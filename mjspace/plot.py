@@ -62,7 +62,7 @@ def figure(log: Log, signals: Sequence[str] = ()) -> Figure:
         _draw(axes, one, colors)
         for bound in bounds(one.panel, scenario.checks, log):
             axes.margins(y=0.16)  # room for the bound's text
-            _mark(axes, bound, colors[bound.component if one.panel.index is None else 0])
+            _mark(axes, bound, colors[bound.component if one.panel.part is None else 0])
         # Saturation, an early end, a check that failed: ticks along the bottom.
         axes.plot(
             warnings,

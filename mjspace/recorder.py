@@ -27,6 +27,7 @@ UNITS = {
         "position": "m",
         "velocity": "m/s",
         "position_error": "m",
+        "tilt": "rad",
         "altitude": "m",
         "ground_velocity": "m/s",
         "thrust": "N",

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 
 from mjspace.assembly import Assembly
+from mjspace.columns import Columns
 from mjspace.contract import Array
 from mjspace.scenario import Scenario
-from mjspace.tape import Columns
 
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from mjspace import attitude
 from mjspace.assembly import Assembly
+from mjspace.columns import Columns
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import FlightError
-from mjspace.sensors import NAVIGATION
 
 Rows = dict[str, dict[str, Array]]
 Happening = tuple[float, int, str, str]
@@ -39,65 +39,13 @@ def shapes(block: Block) -> dict[str, dict[str, tuple[int, ...]]]:
     return {t: {f: a.shape[2:] for f, a in fields.items()} for t, fields in block.rows.items()}
 
 
-PRESSED = 0.001
-"""m that a leg's strut gives when its foot stands on the ground; in flight it is drawn out."""
-
-
-class Columns:
-    """Where things stand in a row of MuJoCo's integration state."""
-
-    def __init__(self, assembly: Assembly) -> None:
-        model = assembly.vehicle.model
-        before_qpos = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
-        before_qvel = before_qpos + model.nq
-        self.motion = slice(before_qpos, before_qvel + model.nv)
-        # The free joint comes first; its angular velocity is in body axes, its linear in inertial.
-        self.position = slice(before_qpos, before_qpos + 3)
-        self.attitude = slice(before_qpos + 3, before_qpos + 7)
-        self.velocity = slice(before_qvel, before_qvel + 3)
-        self.rate = slice(before_qvel + 3, before_qvel + 6)
-        vehicle = assembly.vehicle
-        self.wheel_speed = _columns(before_qvel + vehicle.wheel_dof)
-        self.gimbal_angle = _columns(before_qpos + vehicle.gimbal_qpos)
-        self.gimbal_rate = _columns(before_qvel + vehicle.gimbal_dof)
-        self.wheel_angle = _columns(before_qpos + vehicle.wheel_qpos)
-        self.struts = _columns(before_qpos + vehicle.strut_qpos)
-        self.has_legs = len(vehicle.strut_qpos) > 0
-        sensors = assembly.scenario.sensors
-        self.navigates = any(getattr(sensors, name) is not None for name in NAVIGATION)
-
-    def truth(self, physics: Array) -> Measurement:
-        """Return what ideal sensors see, as views of the state rows where that is possible."""
-        nothing = physics[..., :0]
-        seen = Measurement(
-            physics[..., self.attitude],
-            physics[..., self.rate],
-            physics[..., self.wheel_speed],
-            physics[..., self.gimbal_angle],
-            physics[..., self.gimbal_rate],
-            *[*[nothing] * 9, physics[..., self.wheel_angle]],
-        )
-        if self.has_legs:
-            standing = np.sum(physics[..., self.struts] > PRESSED, axis=-1, keepdims=True) >= 2
-            seen = seen._replace(contact=standing.astype(float))
-        if self.navigates:
-            velocity = physics[..., self.velocity]
-            seen = seen._replace(
-                position=physics[..., self.position],
-                velocity=velocity,
-                altitude=physics[..., self.position][..., 2:],
-                ground_velocity=attitude.rotate(attitude.conjugate(seen.attitude), velocity),
-            )
-        return seen
-
-
 def until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:
     """Return the block up to the first value that cannot be flown, and which it is ('' if none).
 
     A law may well signal infinity; what must be good is the motion and what acts on it.
     """
     acting = {
-        "/state.physics": block.rows["/state"]["physics"][..., columns.motion],
+        "/state.physics": block.rows["/state"]["physics"][..., columns.moving],
         **{f"/measurement.{name}": a for name, a in block.rows["/measurement"].items()},
         **{f"/command.{name}": a for name, a in block.rows["/command"].items()},
     }
@@ -164,7 +112,7 @@ class Tape:
                 **_without_empty(truth._asdict()),
                 "position": physics[..., columns.position],
                 "velocity": physics[..., columns.velocity],
-                **_place_error(physics[..., columns.position], reference),
+                **_about_the_place(physics[..., columns.position], truth.attitude, reference),
                 "momentum": data[..., vehicle.momentum],
                 "energy": data[..., vehicle.kinetic],
                 "attitude_error": attitude.rotation_angle(truth.attitude, reference["attitude"])[
@@ -190,18 +138,18 @@ class Tape:
         return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
 
 
-def _place_error(position: Array, reference: dict[str, Array]) -> dict[str, Array]:
-    """Return how far the vehicle is from where it is wanted, if it is wanted somewhere."""
+def _about_the_place(
+    position: Array, quaternion: Array, reference: dict[str, Array]
+) -> dict[str, Array]:
+    """Return, for a vehicle that is wanted somewhere, how far it is from there, and how upright.
+
+    The tilt [rad] is between the body's z and the world's.
+    """
     if "position" not in reference:
         return {}
-    return {"position_error": position - reference["position"]}
-
-
-def _columns(indices: Any) -> Any:
-    """Return consecutive indices as a slice, which views where a list of them would copy."""
-    if np.all(np.diff(indices) == 1):
-        return slice(indices[0], indices[-1] + 1) if len(indices) else slice(0, 0)
-    return indices
+    lean = np.sqrt(quaternion[..., 1] ** 2 + quaternion[..., 2] ** 2)
+    tilt = 2.0 * np.arcsin(np.minimum(lean, 1.0))
+    return {"position_error": position - reference["position"], "tilt": tilt[..., None]}
 
 
 def _fields(tuples: list[Any]) -> dict[str, Array]:

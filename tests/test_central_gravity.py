@@ -41,7 +41,8 @@ def compiled(gravity: CentralGravity, step: float) -> tuple[Any, Any]:
 
 def fall(gravity: CentralGravity, start: Array, duration: float) -> Array:
     """Return Newton's and Euler's motion, written down without MuJoCo or our code."""
-    gm, centre = gravity.gm, np.array([0.0, 0.0, -float(gravity.radius or 0.0)])
+    gm, radius = central_gravity.pack(gravity)
+    centre = np.array([0.0, 0.0, -radius])
 
     def slope(_: float, y: Array) -> Array:
         r, q, w = y[:3] - centre, y[6:10], y[10:]

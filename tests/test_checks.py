@@ -136,6 +136,11 @@ LOW = Event(name="low", signal="truth.error", below=0.7, above=0.0)  # first at 
 NEVER = Event(name="never", signal="truth.error", above=10.0)
 
 
+def test_some_components_have_a_norm_of_their_own() -> None:
+    assert measure(signal="truth.rate[0:2]", statistic="peak") == 15.0
+    assert measure(signal="truth.rate[1:3]", statistic="peak") == 20.0
+
+
 @pytest.mark.parametrize(
     ("window", "value"),
     [

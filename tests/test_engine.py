@@ -22,7 +22,7 @@ class Vehicle:
 
 def engine(**table: Any) -> GimballedEngine:
     numbers = {"thrust_max": 320.0, "thrust_min": 50.0} | table
-    return GimballedEngine.of(Vehicle(), Engine(**numbers))  # type: ignore[arg-type]
+    return GimballedEngine.of(Vehicle(), Engine(**numbers))
 
 
 def seen(angle: Any = ((0.0, 0.0),), rate: Any = ((0.0, 0.0),)) -> Measurement:
@@ -78,7 +78,7 @@ def test_propellant_goes_with_thrust_over_exhaust_speed() -> None:
     state, acted = burn(flown, [162.0] * 500)
     used = np.sum(acted[:, 2]) * STEP / (320.0 * STANDARD_GRAVITY)
     assert 20.0 - state["propellant"][0, 0] == pytest.approx(used, rel=1e-10)
-    assert 162.0 / (320.0 * STANDARD_GRAVITY) == pytest.approx(0.0516, abs=5e-5)  # kg/s
+
     body, left = flown.masses(state)["body_mass"]
     assert Vehicle.model.body(body).name == "tank"
     assert left == state["propellant"][0]

@@ -133,7 +133,7 @@ DEG = 180.0 / np.pi
         ),
         (MOMENTUM, [Bound("drift > 0.001", 0.001, 0.0, 1.0, False, 0)]),
         (SPEED, []),
-        (Panel("one", "/truth", "rate", index=1), []),
+        (Panel("one", "/truth", "rate", part=slice(1, 2)), []),
     ],
 )
 def test_bounds_stand_on_the_panel_of_their_signal(

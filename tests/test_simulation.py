@@ -9,13 +9,14 @@ import pytest
 
 from mjspace.assembly import Assembly, assemble
 from mjspace.attitude import rotation_angle
+from mjspace.columns import Columns
 from mjspace.contract import Measurement, Reference
 from mjspace.errors import FlightError
 from mjspace.loading import load
 from mjspace.plant import UnphysicalInertiaWarning
 from mjspace.simulation import fly
 from mjspace.start import Start, first_start
-from mjspace.tape import Block, Columns
+from mjspace.tape import Block
 
 pytestmark = pytest.mark.filterwarnings(
     f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"

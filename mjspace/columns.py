@@ -1,0 +1,72 @@
+"""Where a vehicle's motion stands in a row of MuJoCo's integration state."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjspace import attitude
+from mjspace.assembly import Assembly
+from mjspace.contract import Array, Measurement
+from mjspace.sensors import NAVIGATION
+
+PRESSED = 0.001
+"""m that a leg's strut gives when its foot stands on the ground; in flight it is drawn out."""
+
+
+class Columns:
+    """Where things stand in a row of MuJoCo's integration state."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        model = assembly.vehicle.model
+        before_qpos = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
+        before_qvel = before_qpos + model.nq
+        self.moving = slice(before_qpos, before_qvel + model.nv)
+        # The free joint comes first; its angular velocity is in body axes, its linear in inertial.
+        self.position = slice(before_qpos, before_qpos + 3)
+        self.attitude = slice(before_qpos + 3, before_qpos + 7)
+        self.velocity = slice(before_qvel, before_qvel + 3)
+        self.rate = slice(before_qvel + 3, before_qvel + 6)
+        vehicle = assembly.vehicle
+        self.wheel_speed = _columns(before_qvel + vehicle.wheel_dof)
+        self.gimbal_angle = _columns(before_qpos + vehicle.gimbal_qpos)
+        self.gimbal_rate = _columns(before_qvel + vehicle.gimbal_dof)
+        self.wheel_angle = _columns(before_qpos + vehicle.wheel_qpos)
+        self.struts = _columns(before_qpos + vehicle.strut_qpos)
+        self.has_legs = len(vehicle.strut_qpos) > 0
+        sensors = assembly.scenario.sensors
+        self.navigates = any(getattr(sensors, name) is not None for name in NAVIGATION)
+        self.has_velocimeter = sensors.ground_velocity is not None
+
+    def truth(self, physics: Array) -> Measurement:
+        """Return what ideal sensors see, as views of the state rows where that is possible."""
+        seen = self.motion(physics)
+        if self.has_legs:
+            standing = np.sum(physics[..., self.struts] > PRESSED, axis=-1, keepdims=True) >= 2
+            seen = seen._replace(contact=standing.astype(float))
+        if self.navigates:
+            position, velocity = physics[..., self.position], physics[..., self.velocity]
+            seen = seen._replace(position=position, velocity=velocity, altitude=position[..., 2:])
+        if self.has_velocimeter:
+            to_body = attitude.conjugate(seen.attitude)
+            seen = seen._replace(ground_velocity=attitude.rotate(to_body, seen.velocity))
+        return seen
+
+    def motion(self, physics: Array) -> Measurement:
+        """Return the truth of what turns alone: all that motors feel."""
+        nothing = physics[..., :0]
+        return Measurement(
+            physics[..., self.attitude],
+            physics[..., self.rate],
+            physics[..., self.wheel_speed],
+            physics[..., self.gimbal_angle],
+            physics[..., self.gimbal_rate],
+            *[*[nothing] * 9, physics[..., self.wheel_angle]],
+        )
+
+
+def _columns(indices: Any) -> Any:
+    """Return consecutive indices as a slice, which views where a list of them would copy."""
+    if np.all(np.diff(indices) == 1):
+        return slice(indices[0], indices[-1] + 1) if len(indices) else slice(0, 0)
+    return indices
