@@ -17,7 +17,7 @@ TESTBED = [path for path in MODULES if path not in LAWS]
 # Flight software computes; it knows no simulator, no log, no clock and no file.
 A_LAW_MAY_IMPORT = (
     *("numpy", "scipy", "numba", "mjspace.attitude", "mjspace.contract", "mjspace.controllers"),
-    *("collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"),
+    *("abc", "collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"),
 )
 # These packages are known to no other module of the testbed.
 ONLY_IN = {
