@@ -94,9 +94,7 @@ class ThrustVectoring:
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} is {getattr(self, name):g}: more than zero would do")
         if not 0.0 < self.thrust_range[0] <= self.thrust_range[1]:
-            raise ValueError(
-                f"thrust_range is {self.thrust_range} N: 0 < least <= largest would do"
-            )
+            raise ValueError(f"thrust_range is {self.thrust_range} N: 0 < least < most would do")
         stable = self.position_gain * self.velocity_gain  # Routh
         if not 0.0 <= self.integral_gain < stable:
             raise ValueError(

@@ -145,7 +145,11 @@ class Modified:
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, ModifiedSignals]:
         """Return the torque, the errors and the torque's parts."""
-        torque, *shown, _ = _rigid(measurement, reference, self.inertia, self._gains)
+        seen, rate = measurement.attitude, measurement.rate
+        momentum = kernels.rigid_momentum(self.inertia, rate)
+        torque, *shown, _ = kernels.modified(
+            seen, rate, momentum, *reference, self.inertia, self._gains
+        )
         return state, TorqueCommand(torque), ModifiedSignals(*shown)
 
     @cached_property
@@ -175,6 +179,10 @@ class Robust:
     """tbar: largest norm of the disturbance; the thesis' reaches 0.0387 (E24)."""
     smoothing: float = gain("W", default=1e-7)
     """eps: what the relay may lose to smoothness."""
+    wheel_axes: Array = gain(shape=(None, 3), default=np.zeros((0, 3)))
+    """Of reaction wheels, body axes: their momentum turns with the bus; ours."""
+    wheel_inertia: Array = gain("kg m^2", (None,), default=())
+    """Axial, of each, which ``inertia`` is without."""
 
     def __post_init__(self) -> None:
         _require_positive(self, "attitude_gain", "rate_gain", "disturbance_bound", "smoothing")
@@ -187,23 +195,17 @@ class Robust:
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, RobustSignals]:
         """Return the torque, the errors and the torque's parts."""
-        torque, *shown = _rigid(measurement, reference, self.inertia, self._gains)
+        seen, rate, M = measurement.attitude, measurement.rate, self.inertia
+        momentum = kernels.gyrostat_momentum(
+            M, rate, self.wheel_axes, self.wheel_inertia, measurement.wheel_speed
+        )
+        torque, *shown = kernels.modified(seen, rate, momentum, *reference, M, self._gains)
         return state, TorqueCommand(torque), RobustSignals(*shown)
 
     @cached_property
     def _gains(self) -> Array:
         control = [self.attitude_gain, self.rate_gain]
         return np.array([*control, self.disturbance_bound, self.smoothing])
-
-
-def _rigid(
-    measurement: Measurement, reference: Reference, inertia: Array, gains: Array
-) -> tuple[Array, ...]:
-    """Return the torque, the errors and the torque's parts for a bus whose momentum is M w."""
-    seen, rate = measurement.attitude, measurement.rate
-    momentum = kernels.rigid_momentum(inertia, rate)
-    parts: tuple[Array, ...] = kernels.modified(seen, rate, momentum, *reference, inertia, gains)
-    return parts
 
 
 def _require_positive(law: object, *names: str) -> None:

@@ -120,3 +120,20 @@ def rigid_momentum(M: Any, w: Any, momentum: Any) -> None:
     """Return M w."""
     for i in range(3):
         momentum[i] = _dot(M[i], w)
+
+
+@guvectorize(
+    ["void(f8[:,:],f8[:],f8[:,:],f8[:],f8[:],f8[:])"],
+    "(v,v),(v),(n,v),(n),(n)->(v)",
+    cache=True,
+)
+def gyrostat_momentum(
+    M: Any, w: Any, axes: Any, wheel_inertia: Any, wheel_speed: Any, momentum: Any
+) -> None:
+    """Return M w and that of wheels, M being without their axial inertia."""
+    for i in range(3):
+        momentum[i] = _dot(M[i], w)
+    for n in range(wheel_speed.size):
+        spin = wheel_inertia[n] * (wheel_speed[n] + _dot(axes[n], w))
+        for i in range(3):
+            momentum[i] += spin * axes[n, i]

@@ -15,6 +15,7 @@ rotor at rest has no back-EMF: it is for wheels that spin, not for gimbals.
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -88,14 +89,15 @@ def turned(vector: Array, angle: Array) -> Array:
     return after
 
 
-def held_in_stator(voltage: Array, angle: Array, swept: Array) -> Array:
+def held_in_stator(voltage: Array, angle: Array, swept: Array, limit: float = inf) -> Array:
     """Return the windings' voltages (..., m, 2) that stand for one that turns with the rotor.
 
     ``voltage`` (..., m, 2) is wanted in the rotor's axes, which are at the electrical ``angle``
     (..., m) [rad] now and will be ``swept`` (..., m) further when the period ends: held in the
-    stator's axes at their middle, and as much longer as its mean in theirs would be too short.
+    stator's axes at their middle, and as much longer as its mean in theirs would be too short; no
+    longer than the supply's ``limit`` [V].
     """
-    after: Array = _held.ufunc(voltage, angle, swept)
+    after: Array = _held.ufunc(voltage, angle, swept, limit)
     return after
 
 
@@ -107,13 +109,16 @@ def _turned(vector: Any, angle: Any, after: Any) -> None:
         after[n, 0], after[n, 1] = there.real, there.imag
 
 
-@guvectorize(["void(f8[:,:],f8[:],f8[:],f8[:,:])"], "(m,k),(m),(m)->(m,k)", cache=True)
-def _held(voltage: Any, angle: Any, swept: Any, after: Any) -> None:
+@guvectorize(["void(f8[:,:],f8[:],f8[:],f8,f8[:,:])"], "(m,k),(m),(m),()->(m,k)", cache=True)
+def _held(voltage: Any, angle: Any, swept: Any, limit: Any, after: Any) -> None:
     for n in range(angle.size):
         half = 0.5 * swept[n]
-        length = half / np.sin(half) if half != 0.0 else 1.0
+        longer = half / np.sin(half) if half != 0.0 else 1.0
+        length = longer * np.hypot(voltage[n, 0], voltage[n, 1])
+        if length > limit:
+            longer *= limit / length
         middle = complex(np.cos(angle[n] + half), np.sin(angle[n] + half))
-        there = complex(voltage[n, 0], voltage[n, 1]) * middle * length
+        there = complex(voltage[n, 0], voltage[n, 1]) * middle * longer
         after[n, 0], after[n, 1] = there.real, there.imag
 
 

@@ -111,6 +111,16 @@ def fly(
     return _flight(time, history, errors, last, ground, stance)
 
 
+def slope_of(y: Array, vehicle: Vehicle = Vehicle()) -> Array:
+    """Return y' of the state (17,), in the paper's axes.
+
+    Position less the Moon's radius, velocity, quaternion, rate, F, b1, b2, burnt propellant.
+    """
+    slope = np.empty(17)
+    _derivative(y, y[13:16], _parameters(vehicle), slope)
+    return slope
+
+
 def _initial(start: Start, vehicle: Vehicle, stance: float) -> Array:
     c, s = np.cos(start.azimuth), np.sin(start.azimuth)
     alpha, phi, gamma = start.angles

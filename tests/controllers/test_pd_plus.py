@@ -228,6 +228,20 @@ def test_the_compensation_is_a_relay_of_the_bound() -> None:
     np.testing.assert_allclose(command.torque - without.torque, relay, rtol=1e-4, atol=1e-13)
 
 
+def test_wheels_add_their_momentum() -> None:
+    """In axes that turn at wr = w - s, h of wheels changes by wr x h, which costs a torque."""
+    seen, wanted = readings(50)
+    axes, inertia = att.normalize(np.array([[1.0, 1.0, 0.0], [0.0, 2.0, -1.0]])), [0.02, 0.03]
+    speed = np.random.default_rng(3).normal(scale=100.0, size=(50, 2))
+    law = Robust(M, wheel_axes=axes, wheel_inertia=np.array(inertia))
+    _, command, shown = law.step(State(), 0.0, seen._replace(wheel_speed=speed), wanted)
+    _, without, _ = Robust(M).step(State(), 0.0, seen, wanted)
+    h = (inertia * (speed + seen.rate @ axes.T)) @ axes
+    np.testing.assert_allclose(
+        command.torque - without.torque, np.cross(seen.rate - shown.s, h), atol=1e-12
+    )
+
+
 @laws
 def test_either_sign_of_either_quaternion(law: Any) -> None:
     seen, wanted = readings(50)

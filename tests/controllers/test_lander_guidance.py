@@ -1,0 +1,91 @@
+"""The descent that saves propellant: its plan, its flight, and how much less it burns."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from lander_laws import LANDS
+from lander_oracle import Flight, Start, Vehicle, fly
+from mjspace.controllers.descent import SineDescent
+from mjspace.controllers.guidance import TABLE_3, BezierDescent, burnt, curve, plan
+from mjspace.controllers.lander_vectoring import ThrustVectoring
+
+LAW = ThrustVectoring(0.02)
+LAGS = {"thrust_lag": 0.1, "gimbal_lag": 0.05, "gimbal_rate": np.radians(20.0)}
+
+
+@cache
+def nominal() -> Flight:
+    return fly(LAW, BezierDescent(), duration=100.0, ground=0.0)
+
+
+def test_the_plan_is_the_one_that_is_kept() -> None:
+    duration, points = plan(np.array([2500.0, 0.0, 1000.0]), np.array([-24.0, -7.0, -10.0]))
+    s = np.linspace(0.0, 1.0, 500)
+
+    def thrust(points: object, duration: float) -> np.ndarray:
+        force = 100.0 * (curve(np.asarray(points), duration, s)[2] + [0.0, 0.0, 1.62283])
+        return np.linalg.norm(force, axis=-1)
+
+    fresh = burnt(thrust(points, duration), duration * s)
+    kept = burnt(thrust(TABLE_3, 79.275), 79.275 * s)
+    assert kept == pytest.approx(5.131, abs=0.002)
+    assert fresh == pytest.approx(kept, abs=0.005)  # where the search stops
+    assert thrust(points, duration).min() > 68.0  # 70 N at a hundred points
+    assert thrust(points, duration).max() < 272.0
+
+
+def test_a_start_that_cannot_be_braked_is_refused() -> None:
+    with pytest.raises(ValueError, match="no descent from"):
+        plan(np.array([100.0, 0.0, 100.0]), np.array([-24.0, 0.0, -60.0]))
+
+
+def test_it_lands_softly_with_less_than_half_of_the_propellant() -> None:
+    flight = nominal()
+    assert flight.time[-1] == pytest.approx(83.4, abs=0.1)
+    assert -flight.velocity[-1, 2] == pytest.approx(0.5, abs=0.01)
+    assert np.hypot(*flight.velocity[-1, :2]) < 0.01  # 0.004
+    assert np.degrees(flight.tilt[-1]) < 0.5  # 0.26
+    assert np.hypot(*flight.position[-1, :2]) < 0.3  # 0.15
+    assert np.linalg.norm(flight.error, axis=-1).max() < 0.5
+    hovering = SineDescent(clearance=2.0, hover=10.0)
+    papers = fly(LANDS, hovering, duration=230.0, ground=0.0).propellant[-1]
+    assert flight.propellant[-1] == pytest.approx(5.34, abs=0.01)
+    assert 1.0 - flight.propellant[-1] / papers == pytest.approx(0.534, abs=0.002)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_it_lands_from_elsewhere_with_another_mass_behind_lags(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+
+    def within(spread: float, count: int = 3) -> list[float]:
+        return list(rng.uniform(-spread, spread, count))
+
+    (up, out, across), (climb, away, turn) = within(20.0), within(2.0)
+    start = Start(
+        1000.0 + up, 2500.0 + out, 0.6435 + across / 2500.0,
+        -10.0 + climb, -24.0 + away, -0.0028 + turn / 2500.0,
+        tuple(np.radians(within(3.0))), tuple(np.radians(within(0.5))),
+    )  # fmt: skip
+    inertia = tuple(np.array([100.0, 90.0, 80.0]) * (1.0 + np.array(within(0.2))))
+    vehicle = Vehicle(100.0 + within(5.0)[0], inertia, depletes=1.0, **LAGS)
+    flight = fly(LAW, BezierDescent(), duration=100.0, start=start, vehicle=vehicle, ground=0.0)
+    # Thirty others: 0.65 and 0.20 m/s, 1.3 deg, 1.5 m, 5.6 kg at most.
+    assert -flight.velocity[-1, 2] < 0.75
+    assert np.hypot(*flight.velocity[-1, :2]) < 0.3
+    assert np.degrees(flight.tilt[-1]) < 2.0
+    assert np.hypot(*flight.position[-1, :2]) < 2.5
+    assert flight.propellant[-1] < 5.8
+
+
+def test_what_the_reference_wants_is_fed_forward() -> None:
+    """Without the wanted rate, the tilt lags behind and the place is lost."""
+
+    class Blind(BezierDescent):
+        def at(self, time: np.ndarray) -> object:
+            wanted = super().at(time)
+            still = np.zeros_like(wanted.rate)
+            return wanted._replace(rate=still, acceleration=still)
+
+    flight = fly(LAW, Blind(), duration=70.0)
+    assert np.abs(flight.error).max() > 10.0 * np.abs(nominal().error).max()
