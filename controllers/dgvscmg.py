@@ -23,9 +23,9 @@ class State(NamedTuple):
     """What the motors' loops remember; the attitude and steering laws remember nothing."""
 
     wheel_wanted: Array
-    """Wanted wheel speed [rad/s], (..., 1)."""
+    """Wanted speed of the wheel about its axis, with what carries it [rad/s], (..., 1)."""
     speed_memory: Array
-    """Of the speed loops, (..., 3, 7)."""
+    """Of the speed loops, (..., 3, 9)."""
     voltage_integral: Array
     """Of the current loops [A s], (..., 3, 2)."""
 
@@ -53,7 +53,8 @@ class Signals(NamedTuple):
     authority: Array
     """Jw |W cos(di)| [N m s], zero where the steering is singular, (..., 1)."""
     speed_error: Array
-    """Wanted less measured speed of each hinge [rad/s], (..., 3)."""
+    """Wanted less measured speed of each hinge [rad/s], the wheel's with what carries it,
+    (..., 3)."""
     vibration_hat: Array
     """Believed vibration torque on the wheel [N m], (..., 1)."""
     phi_hat: Array
@@ -84,10 +85,12 @@ class Cascade:
     """eps: what the relay of the disturbance's compensation may lose to smoothness."""
     steering_damping: float = gain(default=0.01)
     """g0: cos(di) at which the steering loses half."""
+    momentum_damping: float = gain("N m s", default=0.01)
+    """Of the wheel, at which the gimbals' rates lose half, ours."""
     gimbal_rate_limit: float = gain("rad/s", default=np.inf)
-    """Fastest gimbal rate that is asked for, ours: beyond it the whole torque is scaled down."""
+    """Fastest that is asked for, ours: beyond it the torque across the wheel's axis is less."""
     wheel_acceleration_limit: float = gain("rad/s^2", default=np.inf)
-    """Largest wheel acceleration that is asked for, likewise."""
+    """Largest that is asked for, ours."""
     gyroscopic_feedforward: float = gain(default=1.0)
     """Share of the gyroscopic torque that the gimbals' motors are told of; the thesis has 0."""
     turned_inertia: Array = gain("kg m^2", (3,), default=(0.018, 0.017, 0.016))
@@ -102,6 +105,12 @@ class Cascade:
     """k_e; zero: no rejection of vibration."""
     adaptation_gain: Array = gain("1/(N m)^2", (3,), default=(0.0, 0.0, 1.0))
     """k_a."""
+    vibration_limit: Array = gain("N m", (3,), default=(np.inf, np.inf, np.inf))
+    """Largest vibration that is believed, ours: a rejection gone astray does no more than this."""
+    current_limit: Array = gain("A", (3,), default=(np.inf, np.inf, np.inf))
+    """Largest wanted I_q."""
+    speed_steps: int = gain(default=1)
+    """Inner periods in one of the speed loops; the current loops have every one."""
     current_gain: float = gain("1/s", default=3000.0)
     """k_ep; k_ei is k_ep R/L."""
     pole_pairs: Array = gain(shape=(3,), default=(4.0, 4.0, 6.0))
@@ -115,13 +124,19 @@ class Cascade:
 
     def __post_init__(self) -> None:
         _ = self._speed_loop, self._current_loop  # which refuse gains that cannot be
+        period = self.speed_steps * self.inner_period
+        if abs(self.control_period / period - round(self.control_period / period)) > 1e-9:
+            raise ValueError(
+                f"speed_steps {self.speed_steps} make speed loops of {period:g} s: whole parts of "
+                f"the control period of {self.control_period:g} s would do"
+            )
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the state that wants the wheel as fast as it is and believes in no vibration."""
-        speed = _speeds(measurement)
+        speed, carried = _speeds(measurement), _carried(measurement)
         return State(
-            np.array(measurement.wheel_speed),
-            self._speed_loop.reset(speed),
+            (speed + carried)[..., 2:],
+            self._speed_loop.reset(speed, carried),
             self._current_loop.reset(speed),
         )
 
@@ -133,15 +148,22 @@ class Cascade:
         torque, sigma_e, s = pd_plus.wanted_torque(
             measurement.attitude,
             measurement.rate,
-            self._momentum(measurement),
+            steering.momentum(
+                self.inertia, measurement.rate, angle, wheel_speed, self.rotor_inertia
+            ),
             reference,
             self.inertia,
             self._attitude_gains,
         )
         eta, authority = steering.steer(
-            torque, angle, wheel_speed, self.rotor_inertia, self.steering_damping
+            torque,
+            angle,
+            wheel_speed,
+            self.rotor_inertia,
+            self.steering_damping,
+            self.momentum_damping,
         )
-        eta = eta * self._share(eta)
+        eta = steering.within(eta, self._limits)
         load = steering.gimbal_load(measurement.rate, angle, eta, wheel_speed, self.rotor_inertia)
         still, none = np.zeros_like(load), np.zeros_like(wheel_speed)
         command = SpeedCommand(
@@ -151,7 +173,7 @@ class Cascade:
         )
         believed = motor_loops.estimates(state.speed_memory[..., 2:, :])
         wanted = np.concatenate([command.gimbal_rate, state.wheel_wanted], axis=-1)
-        error = wanted - _speeds(measurement)
+        error = wanted - _speeds(measurement) - _carried(measurement)
         shown = Signals(sigma_e, s, torque, authority, error, believed.z1_hat, believed.phi_hat)
         return state, command, shown
 
@@ -160,36 +182,23 @@ class Cascade:
     ) -> tuple[State, VoltageCommand]:
         """Return the motors' voltages for the wanted speeds."""
         speed = _speeds(measurement)
-        wanted = np.concatenate([command.gimbal_rate, state.wheel_wanted], axis=-1)
-        memory, current = self._speed_loop.step(
-            state.speed_memory,
-            measurement.current,
-            speed,
-            wanted,
-            command.acceleration,
-            command.load,
-        )
+        memory, ahead = state.speed_memory, state.wheel_wanted
+        if round(time / self.inner_period) % self.speed_steps == 0:
+            memory, _ = self._speed_loop.step(
+                memory,
+                measurement.current,
+                speed,
+                np.concatenate([command.gimbal_rate, ahead], axis=-1),
+                command.acceleration,
+                command.load,
+                _carried(measurement),
+            )
+            ahead = ahead + self._speed_loop.period * command.acceleration[..., 2:]
+        current = motor_loops.held_current(memory)
         integral, voltage = self._current_loop.step(
             state.voltage_integral, measurement.current, current, speed
         )
-        ahead = state.wheel_wanted + self.inner_period * command.acceleration[..., 2:]
         return State(ahead, memory, integral), VoltageCommand(voltage)
-
-    def _share(self, eta: Array) -> Array:
-        """Return how much of ``eta`` the limits admit, (..., 1): its torque keeps its direction."""
-        excess = np.max(np.abs(eta) / self._limits, axis=-1, keepdims=True)
-        share: Array = 1.0 / np.maximum(excess, 1.0)
-        return share
-
-    def _momentum(self, measurement: Measurement) -> Array:
-        """Return h = Mb w + Jw W s [N m s], body axes, (..., 3)."""
-        spin = self.rotor_inertia * measurement.wheel_speed
-        outer, inner = measurement.gimbal_angle[..., :1], measurement.gimbal_angle[..., 1:]
-        axis = [np.cos(outer) * np.cos(inner), np.sin(outer) * np.cos(inner), -np.sin(inner)]
-        # Written out: BLAS may round one vehicle's product differently in a batch than alone.
-        of_bus = np.sum(self.inertia * measurement.rate[..., None, :], axis=-1)
-        total: Array = of_bus + spin * np.concatenate(axis, axis=-1)
-        return total
 
     @cached_property
     def _attitude_gains(self) -> Array:
@@ -205,13 +214,15 @@ class Cascade:
         return motor_loops.SpeedLoop(
             inertia=self.turned_inertia,
             torque_constant=self.torque_constant,
-            period=self.inner_period,
+            period=self.speed_steps * self.inner_period,
             speed_gain=self.speed_gain,
             integral_gain=self.integral_gain,
             observer_gain=self.observer_gain,
             vibration_gain=self.vibration_gain,
             adaptation_gain=self.adaptation_gain,
-            lead=1.0 / self.current_gain,
+            lead=1.0 / self.current_gain + 0.5 * (self.speed_steps - 1) * self.inner_period,
+            vibration_limit=self.vibration_limit,
+            current_limit=self.current_limit,
         )
 
     @cached_property
@@ -229,3 +240,9 @@ class Cascade:
 def _speeds(measurement: Measurement) -> Array:
     """Return the hinges' speeds: outer gimbal, inner gimbal, wheel [rad/s], (..., 3)."""
     return np.concatenate([measurement.gimbal_rate, measurement.wheel_speed], axis=-1)
+
+
+def _carried(measurement: Measurement) -> Array:
+    """Return how fast each rotor's carrier turns about its axis [rad/s]: the wheel's, (..., 3)."""
+    rate, angle, turn = measurement.rate, measurement.gimbal_angle, measurement.gimbal_rate
+    return np.concatenate([np.zeros_like(turn), steering.carried(rate, angle, turn)], axis=-1)

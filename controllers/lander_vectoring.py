@@ -160,13 +160,13 @@ def _wanted_force(p: Any, v: Any, p_d: Any, v_d: Any, a_d: Any, integral: Any, g
     for i in range(3):
         back[i] = kd * (v[i] - v_d[i]) + kp * (p[i] - p_d[i])
     size = sqrt(back[0] * back[0] + back[1] * back[1] + back[2] * back[2])
-    share = most / size if size > most else 1.0
+    share = most / max(size, most)
     for i in range(3):
         f[i] = a_d[i] + pull * away[i] - share * back[i] - ki * integral[i]
     if f[2] < least / m:
         f[2] = least / m
     side = hypot(f[0], f[1])
-    share = steepest * f[2] / side if side > steepest * f[2] else 1.0
+    share = steepest * f[2] / max(side, steepest * f[2])
     return share * f[0], share * f[1], f[2]
 
 
@@ -188,8 +188,7 @@ def _law(
     f = _to_body(q, _wanted_force(p, v, p_d, v_d, a_d, before, gains))
     size = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
     pointing[0], pointing[1], pointing[2] = -f[1] / size, f[0] / size, 0.0
-    turn = ka * hypot(pointing[0], pointing[1])
-    share = quickest / turn if turn > quickest else 1.0
+    share = quickest / max(ka * hypot(pointing[0], pointing[1]), quickest)
 
     # R^T R_d: the reference's rates are in its own axes.
     back = (q_d[0], -q_d[1], -q_d[2], -q_d[3])

@@ -20,7 +20,7 @@ class BenchState(NamedTuple):
     """Memory of the motor's loops."""
 
     speed_memory: Array
-    """Of the speed loop, (..., 1, 7)."""
+    """Of the speed loop, (..., 1, 9)."""
     voltage_integral: Array
     """Of the current loop [A s], (..., 1, 2)."""
 

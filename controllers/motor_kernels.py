@@ -38,25 +38,27 @@ def current_loop(
 
 
 @guvectorize(
-    ["void(f8[:,:],f8[:,:],f8[:],f8[:],f8[:],f8[:],f8[:,:],f8[:,:],f8[:])"],
-    "(m,s),(m,k),(m),(m),(m),(m),(g,m)->(m,s),(m)",
+    ["void(f8[:,:],f8[:,:],f8[:],f8[:],f8[:],f8[:],f8[:],f8[:,:],f8[:,:],f8[:])"],
+    "(m,s),(m,k),(m),(m),(m),(m),(m),(g,m)->(m,s),(m)",
     cache=True,
 )
 def speed_loop(
-    memory: Any, current: Any, speed: Any, wanted: Any, acceleration: Any, load: Any, gains: Any,
-    after: Any, wanted_current: Any,
+    memory: Any, current: Any, speed: Any, carried: Any, wanted: Any, acceleration: Any, load: Any,
+    gains: Any, after: Any, wanted_current: Any,
 ) -> None:  # fmt: skip
     """Paper 001, (4.19)-(4.22), (4.34), (4.35).
 
     Gains [J, km, kp, ki, ko, ke, ka, lead, ratio, vibration and current limit, period]; memory
-    [W, km I_q - load, integral of the error, W_hat, z1_hat, z2_hat, phi_hat].
+    [W, km I_q - load, integral of the error, W_hat, z1_hat, z2_hat, phi_hat, speed, I_q wanted]; W
+    is speed + carried.
     """
     for n in range(speed.size):
         J, km, kp, ki, lead = gains[0, n], gains[1, n], gains[2, n], gains[3, n], gains[7, n]
         ko, ke, ka = gains[4, n], gains[5, n], gains[6, n]
         phi_limit, z_limit = gains[8, n], gains[9, n]
         current_limit, period = gains[10, n], gains[11, n]
-        W, before, drive_before, integral = speed[n], memory[n, 0], memory[n, 1], memory[n, 2]
+        W, before = speed[n] + carried[n], memory[n, 0]
+        drive_before, integral = memory[n, 1], memory[n, 2]
         error = wanted[n] - W
         drive = km * current[n, 1] - load[n]
 
@@ -64,7 +66,7 @@ def speed_loop(
         if ke > 0.0:
             # From the last instant to this one, with the means of what was measured at both: the
             # internal model turns by the angle that the rotor did, exactly.
-            mean_W, mean_drive = 0.5 * (W + before), 0.5 * (drive + drive_before)
+            mean_W, mean_drive = 0.5 * (speed[n] + memory[n, 7]), 0.5 * (drive + drive_before)
             z1_before, z2_before, slip = memory[n, 4], memory[n, 5], memory[n, 3] - before
             psi, turn = np.sqrt(phi + _TINY), period * mean_W
             cos, sin = np.cos(psi * turn), np.sin(psi * turn)
@@ -85,7 +87,7 @@ def speed_loop(
             z1, z2 = share * z1, share * z2
 
         psi = np.sqrt(phi)
-        angle = psi * W * lead
+        angle = psi * speed[n] * lead
         ahead = np.cos(angle) * z1 + np.sin(angle) * psi * z2
         torque = J * acceleration[n] + load[n] + kp * error + ki * integral - ahead
         asked = torque / km
@@ -97,3 +99,4 @@ def speed_loop(
             integral += period * error
         after[n, 0], after[n, 1], after[n, 2], after[n, 3] = W, drive, integral, W_hat
         after[n, 4], after[n, 5], after[n, 6] = z1, z2, phi
+        after[n, 7], after[n, 8] = speed[n], given

@@ -15,6 +15,8 @@ Where this differs from the paper, and why:
   error, and is kept where a vibration can be: between 0 and ``ratio_limit``.
 - I_q is the measured current, and the vibration is fed back ``lead`` ahead, by when the current
   will have followed: the current loop lags by 1/k_ep.
+- What carries the motor may turn about the rotor's axis. Torques change the rotor's speed together
+  with that, W = speed + ``carried``; the vibration and the back-EMF go with the speed alone.
 - ``load`` and ``integral_gain`` are ours: a motor that holds a gyroscopic torque h x (rate) needs
   one of them, or k_p far above h.
 """
@@ -153,11 +155,15 @@ class SpeedLoop:
                 f"long, less than {2.0 / pole:.2g} s would do"
             )
 
-    def reset(self, speed: Array) -> Array:
-        """Return the memory (..., m, 7) that believes the ``speed`` (..., m) and no vibration."""
+    def reset(self, speed: Array, carried: Array | None = None) -> Array:
+        """Return the memory (..., m, 9) that believes the speed and no vibration.
+
+        ``speed`` and ``carried`` (..., m) are as in ``step``.
+        """
         zero = np.zeros(speed.shape)
+        W = speed if carried is None else speed + carried
         phi = np.broadcast_to(np.asarray(self.ratio, dtype=float), speed.shape)
-        return np.stack([speed, zero, zero, speed, zero, zero, phi], axis=-1)
+        return np.stack([W, zero, zero, W, zero, zero, phi, speed, zero], axis=-1)
 
     def step(
         self,
@@ -167,16 +173,20 @@ class SpeedLoop:
         wanted: Array,
         acceleration: Array,
         load: Array,
+        carried: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Return (memory (..., m, 7), wanted I_q (..., m) [A]).
+        """Return (memory (..., m, 9), wanted I_q (..., m) [A]).
 
-        ``current`` (..., m, 2) and ``speed`` (..., m) are measured [A, rad/s]; ``wanted`` (..., m)
-        is the wanted speed now [rad/s], ``acceleration`` (..., m) its derivative by when the
-        current will have followed [rad/s^2], and ``load`` (..., m) the torque that the motor has to
-        give besides, before the vibration [N m].
+        ``current`` (..., m, 2) and ``speed`` (..., m), relative to what carries the motor, are
+        measured [A, rad/s]; ``carried`` (..., m) is how fast that turns about the motor's axis, not
+        at all when left out. ``wanted`` (..., m) is the wanted sum of both now [rad/s],
+        ``acceleration`` (..., m) its derivative by when the current will have followed [rad/s^2],
+        and ``load`` (..., m) the torque that the motor has to give besides, before the vibration
+        [N m].
         """
+        carried = np.zeros_like(speed) if carried is None else carried
         given: tuple[Array, Array] = kernels.speed_loop.ufunc(
-            memory, current, speed, wanted, acceleration, load, self._gains
+            memory, current, speed, carried, wanted, acceleration, load, self._gains
         )
         return given
 
@@ -189,12 +199,17 @@ class SpeedLoop:
 
 
 def estimates(memory: Array) -> Estimates:
-    """Return what a speed loop's memory (..., m, 7) holds of the motion and the vibration.
+    """Return what a speed loop's memory (..., m, 9) holds of the motion and the vibration.
 
-    Before these it holds the last measured speed, the last k_m I_q less the load, and the integral
-    of the speed's error.
+    Before these it holds the last measured W, the last k_m I_q less the load, and the integral of
+    the speed's error; after them the last measured speed, and the current that was wanted.
     """
     return Estimates(*(memory[..., column].copy() for column in range(3, 7)))
+
+
+def held_current(memory: Array) -> Array:
+    """Return the I_q (..., m) [A] that was wanted last, for a current loop that is called more."""
+    return memory[..., 8]
 
 
 def refuse_fast_poles(kep: Gain, kei: Gain, decay: Gain, period: float) -> None:

@@ -43,6 +43,7 @@ def steer(
     wheel_speed: Array,
     wheel_inertia: float,
     damping: float = 0.01,
+    momentum_damping: float = 0.0,
 ) -> tuple[Array, Array]:
     """Return eta = -chi^-1 torque (..., 3), as do', di' [rad/s], W' [rad/s^2], and the authority.
 
@@ -50,12 +51,15 @@ def steer(
     ``torque_matrix``. Ours, in place of the printed gamma (E17): the 1/cos(di) of (5.8) is damped
     to cos(di) / (cos(di)^2 + damping^2). That is regular at every di, keeps its sign, and is at
     most 1/(2 damping); at the default it loses 25 % of do' at 1 deg from the singularity, 0.3 % at
-    10 deg.
+    10 deg. The momentum's 1/(Jw W) is damped alike, by ``momentum_damping`` [N m s]; without it the
+    rates are infinite or not a number at W = 0.
 
     The authority (..., 1) measures how near that is: Jw |W cos(di)| [N m s], the torque about gi
-    for each rad/s of the outer gimbal. At W = 0 the rates are infinite or not a number.
+    for each rad/s of the outer gimbal.
     """
-    eta, authority = _steer(torque, gimbal_angle, wheel_speed, wheel_inertia, damping)
+    eta, authority = _steer(
+        torque, gimbal_angle, wheel_speed, wheel_inertia, damping, momentum_damping
+    )
     return eta, authority
 
 
@@ -78,6 +82,38 @@ def steer_as_printed(
         torque, gimbal_angle, wheel_speed, wheel_inertia, gamma_0, zeta
     )
     return eta, authority
+
+
+def within(eta: Array, limits: Array) -> Array:
+    """Return ``eta`` (..., 3) with no component beyond its of the ``limits`` (3,).
+
+    The gimbals are slowed down together, so that the torque across the wheel's axis keeps its
+    direction; what is along the axis the wheel gives whatever the gimbals can do, or a wheel that
+    nearly stands would stay so.
+    """
+    excess = np.abs(eta) / limits
+    gimbals = np.max(excess[..., :2], axis=-1, keepdims=True)
+    excess = np.concatenate([gimbals, gimbals, excess[..., 2:]], axis=-1)
+    kept: Array = eta / np.maximum(excess, 1.0)
+    return kept
+
+
+def momentum(
+    inertia: Array, rate: Array, gimbal_angle: Array, wheel_speed: Array, wheel_inertia: float
+) -> Array:
+    """Return h = Mb w + Jw W s [N m s], body axes, (..., 3), of the bus (3, 3) and the wheel."""
+    h: Array = _momentum(inertia, rate, gimbal_angle, wheel_speed, wheel_inertia)
+    return h
+
+
+def carried(rate: Array, gimbal_angle: Array, gimbal_rate: Array) -> Array:
+    """Return how fast the inner gimbal carries the wheel round about its axis [rad/s], (..., 1).
+
+    It is s . w - do' sin(di), with the bus's ``rate`` (..., 3). A motor that turns the wheel by u
+    on that axis gives Jw (W + carried)' = u, exactly; the thesis has Jw W' = u.
+    """
+    given: Array = _carried(rate, gimbal_angle, gimbal_rate)[..., None]
+    return given
 
 
 def gimbal_load(
@@ -108,25 +144,27 @@ def _dot(a: Any, b: Any) -> Any:
 
 
 @njit(error_model="numpy")
-def _rates(torque: Any, angle: Any, speed: float, Jw: float, inverse: float, eta: Any) -> None:
-    """Write -chi^-1 torque, with ``inverse`` for 1/cos(di)."""
+def _rates(torque: Any, angle: Any, per_h: float, Jw: float, inverse: float, eta: Any) -> None:
+    """Write -chi^-1 torque, with ``inverse`` for 1/cos(di), ``per_h`` for 1/(Jw W)."""
     s, gi, t = _axes(angle)
-    eta[0] = -_dot(gi, torque) * inverse / (Jw * speed)
-    eta[1] = _dot(t, torque) / (Jw * speed)
+    eta[0] = -_dot(gi, torque) * inverse * per_h
+    eta[1] = _dot(t, torque) * per_h
     eta[2] = -_dot(s, torque) / Jw
 
 
 _GIVEN = "(v),(g),(n),()"  # torque or rate, gimbal angles, wheel speed, wheel inertia
 
 
-@guvectorize(["void(f8[:],f8[:],f8[:],f8,f8,f8[:],f8[:])"], f"{_GIVEN},()->(v),(n)", cache=True)
+@guvectorize(
+    ["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_GIVEN},(),()->(v),(n)", cache=True
+)
 def _steer(
-    torque: Any, angle: Any, speed: Any, Jw: Any, damping: Any, eta: Any, authority: Any
+    torque: Any, angle: Any, speed: Any, Jw: Any, damping: Any, h0: Any, eta: Any, authority: Any
 ) -> None:
-    cosine = math.cos(angle[1])
+    cosine, h = math.cos(angle[1]), Jw * speed[0]
     inverse = cosine / (cosine * cosine + damping * damping)
-    _rates(torque, angle, speed[0], Jw, inverse, eta)
-    authority[0] = abs(Jw * speed[0] * cosine)
+    _rates(torque, angle, h / (h * h + h0 * h0), Jw, inverse, eta)
+    authority[0] = abs(h * cosine)
 
 
 @guvectorize(
@@ -137,7 +175,7 @@ def _steer_as_printed(
 ) -> None:
     cosine = math.cos(angle[1])
     gamma = gamma_0 * math.exp(zeta * cosine * cosine) * math.sin(angle[1])
-    _rates(torque, angle, speed[0], Jw, 1.0 / (cosine + gamma), eta)
+    _rates(torque, angle, 1.0 / (Jw * speed[0]), Jw, 1.0 / (cosine + gamma), eta)
     authority[0] = abs(Jw * speed[0] * cosine)
 
 
@@ -150,3 +188,16 @@ def _gimbal_load(rate: Any, angle: Any, eta: Any, speed: Any, Jw: Any, load: Any
     y = w[2] * h * s[0] - w[0] * h * s[2] + dh * s[1]
     z = w[0] * h * s[1] - w[1] * h * s[0] + dh * s[2]
     load[0], load[1] = z, gi[0] * x + gi[1] * y
+
+
+@guvectorize(["void(f8[:,:],f8[:],f8[:],f8[:],f8,f8[:])"], "(v,v),(v),(g),(n),()->(v)", cache=True)
+def _momentum(inertia: Any, rate: Any, angle: Any, speed: Any, Jw: Any, momentum: Any) -> None:
+    s, _, _ = _axes(angle)
+    for i in range(3):
+        momentum[i] = _dot(inertia[i], rate) + Jw * speed[0] * s[i]
+
+
+@guvectorize(["void(f8[:],f8[:],f8[:],f8[:])"], "(v),(g),(g)->()", cache=True)
+def _carried(rate: Any, angle: Any, turn: Any, carried: Any) -> None:
+    s, _, _ = _axes(angle)
+    carried[0] = _dot(s, rate) + s[2] * turn[0]

@@ -22,8 +22,11 @@ class Actuators(Protocol):
 
     logged_as: ClassVar[str]
     """The field of /command that their torques are logged under."""
-    takes: ClassVar[str]
-    """What a command must have."""
+
+    @property
+    def takes(self) -> str:
+        """What a command must have."""
+
     acts_on: ClassVar[str]
     """MuJoCo's array that ``act`` fills: "ctrl", or "qfrc_applied" for the bus's torque."""
     stateful: ClassVar[bool]
@@ -106,10 +109,17 @@ class ReactionWheels:
 class IdealThrusters:
     """Thrusters of which nothing is modelled but their torque, which is what the law asks for."""
 
+    obeys: str = "torque"
+    """The field of the command."""
+
     logged_as: ClassVar[str] = "thruster_torque"
-    takes: ClassVar[str] = "torque of shape (..., 3) [N m]"
     acts_on: ClassVar[str] = "qfrc_applied"
     stateful: ClassVar[bool] = False
+
+    @property
+    def takes(self) -> str:
+        """What a command must have."""
+        return f"{self.obeys} of shape (..., 3) [N m]"
 
     def reset(self, vehicles: int) -> State:
         """Return no state."""
@@ -118,8 +128,9 @@ class IdealThrusters:
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
-        """Return the torque of a ``TorqueCommand``, body axes, (N, 3); nothing is ever cut."""
-        torque = np.asarray(command.torque, dtype=float).reshape(truth.rate.shape)
+        """Return the torque that is asked for, body axes, (N, 3); nothing is ever cut."""
+        asked = getattr(command, self.obeys)
+        torque = np.asarray(asked, dtype=float).reshape(truth.rate.shape)
         return state, torque, np.zeros((len(torque), 0))
 
     def seen(self, state: State, truth: Measurement) -> Measurement:

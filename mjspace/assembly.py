@@ -10,6 +10,7 @@ import numpy as np
 
 from mjspace import central_gravity, environment, plant
 from mjspace.actuators import Actuators, IdealThrusters, ReactionWheels
+from mjspace.combined_actuators import Together
 from mjspace.components import construct, load_object, source_of
 from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.engine import GimballedEngine
@@ -35,7 +36,7 @@ class Assembly:
     """At time zero, (nv,)."""
     userdata: Array
     """The environment's parameters, one row (nuserdata,)."""
-    actuators: Actuators
+    actuators: Together
     reference: ReferenceSource
     law: Law
     disturbance: Callable[..., tuple[Any, Any]] | None
@@ -137,14 +138,18 @@ def _in_log(role: str, kind: str) -> str:
     return f"{role}.py:{name}" if place.endswith(".py") else kind
 
 
-def _actuators(vehicle: Vehicle, table: PlantTable) -> Actuators:
+def _actuators(vehicle: Vehicle, table: PlantTable) -> Together:
+    kinds: list[Actuators] = []
     if table.drives:
-        return MotorDrives.of(vehicle, [table.drives[name] for name in vehicle.motors])
-    if table.ideal_thrusters:
-        return IdealThrusters()
+        kinds.append(MotorDrives.of(vehicle, [table.drives[name] for name in vehicle.motors]))
     if table.engine is not None:
-        return GimballedEngine.of(vehicle, table.engine)
-    return ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit)
+        kinds.append(GimballedEngine.of(vehicle, table.engine))
+    if table.wheels.axes or not (kinds or table.ideal_thrusters):
+        wheels = ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit)
+        kinds.append(wheels)
+    if table.ideal_thrusters:
+        kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
+    return Together(tuple(kinds))
 
 
 def _friction(table: PlantTable) -> dict[str, float]:

@@ -139,9 +139,10 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
 
     def __init__(self, assembly: Assembly) -> None:
         scenario = assembly.scenario
-        if not isinstance(assembly.actuators, ReactionWheels):
+        wheels = assembly.actuators.kinds[0]
+        if not isinstance(wheels, ReactionWheels) or len(assembly.actuators.kinds) > 1:
             raise InputError("plant: an environment's action is a torque for reaction wheels")
-        self._wheels, self._inertia = assembly.actuators, assembly.vehicle.inertia
+        self._wheels, self._inertia = wheels, assembly.vehicle.inertia
         self._control, self._last = scenario.rates.control, last_period(scenario)
         self._bounds = [
             (check.start, math.inf if check.end is None else check.end, check.below)

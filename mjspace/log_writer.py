@@ -90,8 +90,10 @@ class LogWriter:
         """Log the scene's bodies in ``world`` on /tf, with the next chunk.
 
         ``time`` [s] of shape (m,), ``positions`` [m] (m, bodies, 3), ``quaternions`` (m, bodies,
-        4), scalar first, body to world.
+        4), scalar first, body to world. A block of few periods may have none.
         """
+        if not len(time):
+            return
         stamps = nanoseconds(time)
         records = self._frames.rows(len(time))
         _stamp(records["/tf"], stamps, np.zeros(len(time), int))

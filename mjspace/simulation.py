@@ -80,10 +80,10 @@ class _Flight:
         self.sensors, self.law_state = start.sensors, start.law
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
         self.batch.state[:] = start.physics
-        self.applied = self._applied(assembly.actuators.acts_on)
+        self.applied = [self._applied(kind.acts_on) for kind in assembly.actuators.kinds]
         self.sensordata = self.batch.bind("sensordata")
         self.actuators, self.actuator_state = assembly.actuators, start.actuators
-        self.masses = getattr(assembly.actuators, "masses", None)
+        self.masses = assembly.actuators.masses
         self.inner = getattr(assembly.law, "inner", None)
         self.push = None
         if assembly.disturbance is not None:
@@ -136,7 +136,7 @@ class _Flight:
         tape.actuators.append(self.actuator_state)
         self.sensors, measurement = self.suite.sample(self.sensors, period * self.steps, truth)
         before, command, signals = self._ask_law(now, measurement, reference)
-        motor, saturated = self._drive(now, command, measurement, truth)
+        given, saturated = self._drive(now, command, measurement, truth)
         if self.push is not None:
             tape.push.append(self.push(now, truth))
         # Derived fields lag the state by one substep: the first substep computes those of `now`.
@@ -147,7 +147,7 @@ class _Flight:
         tape.law.append(before)
         tape.measurement.append(measurement)
         tape.command.append(command)
-        tape.motor_torque.append(motor)
+        tape.given.append(given)
         tape.saturated.append(saturated)
         tape.signals.append(signals)
         tape.sensordata.append(self.sensordata.copy())
@@ -170,7 +170,7 @@ class _Flight:
 
     def _drive(
         self, now: float, command: Any, measurement: Measurement, truth: Measurement
-    ) -> tuple[Array, Array]:
+    ) -> tuple[tuple[Array, ...], Array]:
         """Let the motors act on the command; return their torques, and which of them are cut."""
         if self.inner is not None:
             try:
@@ -179,16 +179,12 @@ class _Flight:
                 raise FlightError(
                     f"the law's inner loop raised {type(error).__name__}: {error}"
                 ) from error
-        try:
-            self.actuator_state, motor, saturated = self.actuators.act(
-                self.actuator_state, command, truth, self.hold
-            )
-        except Exception as error:
-            raise FlightError(
-                f"the law's command has no {self.actuators.takes}: {error}"
-            ) from error
-        self.applied[:] = motor
-        return motor, saturated
+        self.actuator_state, given, saturated = self.actuators.act(
+            self.actuator_state, command, truth, self.hold
+        )
+        for view, torque in zip(self.applied, given, strict=True):
+            view[:] = torque
+        return given, saturated
 
     def _weigh(self, masses: dict[str, tuple[int, Array]]) -> None:
         """Give bodies the mass that they have by now, and keep it for the period."""
@@ -197,7 +193,7 @@ class _Flight:
         self.batch.set_const()
 
     def _applied(self, array: str) -> Array:
-        """Return the view of MuJoCo's input that the actuators fill."""
+        """Return the view of MuJoCo's input that actuators of a kind fill."""
         vehicle = self.assembly.vehicle
         bus_turn = slice(3, 6)  # the free joint comes first, its torque in body axes
         view: Array = self.batch.bind(array)

@@ -126,7 +126,8 @@ class PlantTable(Table):
     ripple: dict[Name, Ripple] = {}
     """Torque ripple of motors, by the hinge."""
     ideal_thrusters: bool = False
-    """Whether the law's torque acts on the bus as if by thrusters, as it is; no wheels then."""
+    """Whether a torque that the law asks for acts on the bus as if by thrusters, as it is: its
+    command's ``torque`` or, beside motors or an engine, its ``thruster_torque``."""
     engine: Engine | None = None
     """What its engine on gimbals does, of a model that has one; no wheels then."""
     ground: Ground | None = None
@@ -134,11 +135,7 @@ class PlantTable(Table):
 
     @model_validator(mode="after")
     def _one_kind_of_motor(self) -> "PlantTable":
-        kinds = {
-            "drives": bool(self.drives),
-            "ideal_thrusters": self.ideal_thrusters,
-            "engine": self.engine is not None,
-        }
+        kinds = {"drives": bool(self.drives), "engine": self.engine is not None}
         given = [name for name, is_given in kinds.items() if is_given]
         if given and self.wheels.axes:
             raise ValueError("one kind of motor: set wheels.axes = [] to fly without wheels")

@@ -76,7 +76,7 @@ class Tape:
     law: list[Any] = field(default_factory=list)
     measurement: list[Measurement] = field(default_factory=list)
     command: list[Any] = field(default_factory=list)
-    motor_torque: list[Array] = field(default_factory=list)
+    given: list[tuple[Array, ...]] = field(default_factory=list)
     saturated: list[Array] = field(default_factory=list)
     signals: list[Any] = field(default_factory=list)
     push: list[Array] = field(default_factory=list)
@@ -126,7 +126,7 @@ class Tape:
             },
             "/command": {
                 **_fields(self.command[:n]),
-                assembly.actuators.logged_as: np.array(self.motor_torque[:n]),
+                **assembly.actuators.logged(self.given[:n]),
             },
             "/law": _fields(self.signals[:n]),
             "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},

@@ -6,6 +6,7 @@ Classical Runge-Kutta, the command held over each control period. In a test:
 ``from lander_oracle import fly``.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -81,11 +82,13 @@ def fly(
     period: float = 0.02,
     substeps: int = 1,
     ground: float = -np.inf,
+    sense: Callable[[Measurement], Measurement] = lambda truth: truth,
 ) -> Flight:
     """Return the flight of one vehicle until it is at ``ground`` [m] or ``duration`` [s] is over.
 
     The last row is interpolated on the ground. Positions are those of the vehicle's origin, less
-    the reference's ``stance``, as if it stood on its origin.
+    the reference's ``stance``, as if it stood on its origin. The law sees what ``sense`` makes of
+    the truth, once a period.
     """
     rows = round(duration / period) + 1
     time, stance = period * np.arange(rows), reference.stance
@@ -95,7 +98,8 @@ def fly(
     state = None
     last = rows - 1
     for k in range(rows):
-        seen = _seen(y)
+        truth = _seen(y)
+        seen = sense(truth)
         now = Trajectory(*(part[k] for part in wanted))
         if state is None:
             state = law.reset(seen, now)
@@ -103,7 +107,7 @@ def fly(
         (thrust,), (outer, inner) = command.thrust[0], command.gimbal[0]
         asked = np.array([thrust, inner, outer])
         _settle(y, asked, parameters)
-        history[k], errors[k] = y, seen.position[0] - now.position
+        history[k], errors[k] = y, truth.position[0] - now.position
         if y[0] - stance <= ground:
             last = k
             break

@@ -96,6 +96,13 @@ def test_a_clock_that_sums_its_steps_still_ticks_in_whole_milliseconds(tmp_path:
     np.testing.assert_array_equal(read["time"], np.arange(1, 3001) / 1000)
 
 
+def test_a_block_too_short_for_a_frame_is_logged(tmp_path: Path) -> None:
+    with create(tmp_path / "flight.mcap") as log:
+        log.write_transforms(np.zeros(0), np.zeros((0, 2, 3)), np.zeros((0, 2, 4)))
+        log.write(*rows(0, 3))
+    assert len(Log(tmp_path / "flight.mcap").read("/truth")["time"]) == 3
+
+
 def test_an_event_after_the_last_period_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     with create(path) as log:

@@ -135,7 +135,7 @@ def test_a_motor_without_a_drive_is_refused() -> None:
     ("scenario", "override", "message"),
     [
         ("dgvscmg-tracking", "plant.wheels.axes=[[1,0,0]]", "one kind of motor: set wheels.axes"),
-        ("dgvscmg-tracking", "plant.ideal_thrusters=true", "give one"),
+        ("dgvscmg-tracking", "plant.engine={thrust_max=1}", "give one"),
         (
             "dgvscmg-tracking",
             "plant.drives.cmg_door={pole_pairs=1, resistance=1, inductance=1, torque_constant=1}",

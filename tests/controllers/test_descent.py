@@ -107,6 +107,7 @@ def test_bezier_starts_as_table_3_upright_and_ends_descending() -> None:
     # It accelerates straight down; gravity is 1.4e-3 rad off the vertical, 2.5 km away.
     np.testing.assert_allclose(wanted.linear_acceleration[:2, :2], 0.0, atol=2e-5)
     np.testing.assert_allclose(wanted.rate[:2], 0.0, atol=1e-3)
+    assert not wanted.linear_acceleration[2].any()
 
 
 @pytest.mark.parametrize(

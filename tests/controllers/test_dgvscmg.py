@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 from mjspace.controllers.dgvscmg import Cascade, State
+from mjspace.controllers.motor_loops import held_current
+from mjspace.controllers.steering import carried
 
 from mjspace.contract import Measurement, Reference
 
@@ -72,8 +74,39 @@ def test_nothing_is_asked_of_a_satellite_that_is_where_it_should_be() -> None:
 def test_the_wheel_s_wanted_speed_is_the_integral_of_what_the_steering_wants() -> None:
     measurement = seen(2)
     state, command, *_ = flown(cascade(), measurement)
-    wanted = measurement.wheel_speed + 3e-4 * command.acceleration[:, 2:]
+    # about its axis: with what the bus and the outer gimbal turn there
+    with_carrier = measurement.wheel_speed + carried(
+        measurement.rate, measurement.gimbal_angle, measurement.gimbal_rate
+    )
+    wanted = with_carrier + 3e-4 * command.acceleration[:, 2:]
     np.testing.assert_allclose(state.wheel_wanted, wanted, rtol=1e-14)
+
+
+def test_a_slower_speed_loop_holds_the_currents_that_it_wants() -> None:
+    """Every fifth inner period, told by the time alone: any period is a start."""
+    law, measurement = cascade(speed_steps=5), seen(2)
+    state = law.reset(measurement, AT_REST)
+    _, command, _ = law.step(state, 0.0, measurement, AT_REST)
+    changed = []
+    for k in range(100, 115):
+        before = state
+        state, _ = law.inner(before, k * 1e-4, command, measurement)
+        changed.append(np.any(state.speed_memory != before.speed_memory))
+        assert np.any(state.voltage_integral != before.voltage_integral)
+    assert np.flatnonzero(changed).tolist() == [0, 5, 10]
+    gained = state.wheel_wanted - law.reset(measurement, AT_REST).wheel_wanted
+    np.testing.assert_allclose(gained, 1.5e-3 * command.acceleration[:, 2:], rtol=1e-11)
+
+
+def test_limits_hold_whatever_is_measured() -> None:
+    gains = {"gimbal_rate_limit": 2.0, "wheel_acceleration_limit": 30.0}
+    law = cascade(**gains, current_limit=np.array([3.0, 3.0, 0.2]))
+    measurement = seen(200)._replace(wheel_speed=np.linspace(-3.0, 3.0, 201)[:-1, None])
+    state, command, *_ = flown(law, measurement)
+    assert np.abs(command.gimbal_rate).max() == pytest.approx(2.0)
+    assert np.abs(command.acceleration).max() == pytest.approx(30.0)
+    asked = np.abs(held_current(state.speed_memory))
+    np.testing.assert_allclose(asked.max(axis=0), [3.0, 3.0, 0.2])
 
 
 def test_the_thesis_leaves_the_gyroscopic_torque_out() -> None:
@@ -89,6 +122,8 @@ def test_the_thesis_leaves_the_gyroscopic_torque_out() -> None:
     [
         ({"current_gain": 9e6}, "control period of 0.0001 s is too long"),  # erratum E21
         ({"speed_gain": np.array([2.0, 2.0, 500.0])}, "pole"),
+        ({"speed_steps": 5, "speed_gain": np.array([2.0, 2.0, 100.0])}, r"period of 0\.0005 s"),
+        ({"speed_steps": 3}, "speed_steps"),
     ],
 )
 def test_gains_that_the_period_cannot_bear_are_refused(gains: Any, message: str) -> None:

@@ -235,6 +235,29 @@ def test_the_integral_finds_a_load_that_nobody_told() -> None:
     assert speed[1] == pytest.approx(-0.25, rel=1e-6)  # load / k_p
 
 
+def test_what_carries_the_rotor_need_not_disturb_it() -> None:
+    """J (W + c)' = k_m I_q + z1 on a carrier that swings: told of it, and not."""
+    swing, pace = 2.0, 8.0  # rad/s
+    loop = SpeedLoop(
+        np.full(2, J), KM, STEP, 0.32, observer_gain=1.0, vibration_gain=5.0, ratio=PSI**2
+    )
+    total, angle, zero = np.full(2, 100.0), np.zeros(2), np.zeros(2)
+    memory, asked, missed = loop.reset(total), zero, []
+    for k in range(20000):
+        c = swing * np.sin(pace * k * STEP)
+        current = np.stack([zero, asked], axis=-1)
+        told = np.array([c, 0.0])
+        wanted = 100.0 + zero
+        memory, asked = loop.step(memory, current, total - c, wanted, zero, zero, told)
+        missed.append(total - 100.0)
+        z1 = LAMBDA * np.cos(PSI * angle + PHI)
+        angle += STEP * (total - c)
+        total = total + STEP * (KM * asked + z1) / J
+    knowing, not_knowing = rms(np.array(missed)[15000:])
+    assert knowing < 1e-3  # 1.4e-4: what Euler's step leaves here
+    assert not_knowing > 1.0  # 1.2: the rotor is made to follow its carrier
+
+
 def test_an_integral_holds_at_the_current_limit() -> None:
     loop = SpeedLoop(J, KM, STEP, 2.0, integral_gain=20.0, current_limit=3.0)
     one = np.ones(1)

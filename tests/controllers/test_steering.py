@@ -4,7 +4,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mjspace.controllers.steering import gimbal_load, steer, steer_as_printed, torque_matrix
+from mjspace.controllers.steering import (
+    carried,
+    gimbal_load,
+    momentum,
+    steer,
+    steer_as_printed,
+    torque_matrix,
+    within,
+)
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -20,7 +28,7 @@ def frame(angle: Array) -> Array:
     return Rotation.from_euler("ZY", angle).as_matrix()
 
 
-def momentum(angle: Array, speed: Array) -> Array:
+def of_wheel(angle: Array, speed: Array) -> Array:
     return JW * speed[0] * frame(angle)[:, 0]
 
 
@@ -40,8 +48,8 @@ def test_the_torque_is_the_momentum_lost() -> None:
         chi = torque_matrix(angle, speed, JW)
         for eta in np.eye(3):
             shift = h * eta
-            after = momentum(angle + shift[:2], speed + shift[2])
-            before = momentum(angle - shift[:2], speed - shift[2])
+            after = of_wheel(angle + shift[:2], speed + shift[2])
+            before = of_wheel(angle - shift[:2], speed - shift[2])
             # h^2/6 of the third derivative, Jw W, and rounding of 1e-16 Jw W / h.
             np.testing.assert_allclose(chi @ eta, (after - before) / (2.0 * h), atol=1e-9)
 
@@ -100,7 +108,7 @@ def test_the_printed_form_differs_in_the_outer_rate_alone() -> None:
     torque, angle, speed = readings(20)
     printed, authority = steer_as_printed(torque, angle, speed, JW)
     ours, same = steer(torque, angle, speed, JW)
-    np.testing.assert_array_equal(printed[:, 1:], ours[:, 1:])
+    np.testing.assert_allclose(printed[:, 1:], ours[:, 1:], rtol=1e-15)  # 1.7e-16
     np.testing.assert_array_equal(authority, same)
 
 
@@ -119,7 +127,7 @@ def test_the_gimbals_bear_what_turns_the_wheel() -> None:
             speed: Array = speed,
             eta: Array = eta,
         ) -> Array:
-            now = momentum(angle + t * eta[:2], speed + t * eta[2])
+            now = of_wheel(angle + t * eta[:2], speed + t * eta[2])
             return Rotation.from_rotvec(t * rate).apply(now)
 
         torque = (inertial(h) - inertial(-h)) / (2.0 * h)
@@ -155,6 +163,51 @@ def test_alone_and_in_a_batch_are_the_same_bits(law: Any) -> None:
     for i in range(64):
         alone = law(*(part[i] for part in given))
         assert all(np.array_equal(one, many[i]) for one, many in zip(alone, together, strict=True))
+
+
+def test_a_bus_and_its_wheel_have_the_sum_of_their_momenta() -> None:
+    rate, angle, speed = readings(20)
+    bus = np.array([[10.5, 0.22, 0.47], [0.22, 12.5, 0.36], [0.47, 0.36, 13.6]])
+    for w, at, W, h in zip(rate, angle, speed, momentum(bus, rate, angle, speed, JW), strict=True):
+        np.testing.assert_allclose(h, bus @ w + of_wheel(at, W), rtol=1e-13, atol=1e-13)
+
+
+def test_what_carries_the_wheel_turns_with_the_bus_and_the_outer_gimbal() -> None:
+    """Against the inner gimbal's attitude in inertial axes, by central differences."""
+    rate, angle, _ = readings(50)
+    turn = 3.0 * readings(51)[1][1:]
+    h = 1e-5
+    for w, at, by, seen in zip(rate, angle, turn, carried(rate, angle, turn), strict=True):
+        after = Rotation.from_rotvec(h * w).as_matrix() @ frame(at + h * by)
+        before = Rotation.from_rotvec(-h * w).as_matrix() @ frame(at - h * by)
+        skew = frame(at).T @ (after - before) / (2.0 * h)  # S of the rate, in axes s, gi, t
+        # h^2/6 of the third derivative, the cube of rates up to 13 rad/s
+        assert seen[0] == pytest.approx(skew[2, 1], abs=1e-7)
+
+
+def test_gimbals_are_slowed_down_together_and_the_wheel_alone() -> None:
+    limits = np.array([2.0, 2.0, 40.0])
+    eta = np.array([[1.0, -1.5, 30.0], [4.0, -3.0, 30.0], [1.0, -8.0, -60.0]])
+    wanted = [[1.0, -1.5, 30.0], [2.0, -1.5, 30.0], [0.25, -2.0, -40.0]]
+    np.testing.assert_allclose(within(eta, limits), wanted, rtol=1e-15)
+    # limited gimbals take the torque across the wheel's axis down, without turning it
+    _, angle, speed = readings(40)
+    fast = 10.0 * readings(41)[0][1:] * [1.0, 1.0, 0.0]
+    chi = torque_matrix(angle, speed, JW)
+    full, less = (np.einsum("nij,nj->ni", chi, e) for e in (fast, within(fast, limits)))
+    share = np.linalg.norm(less, axis=1) / np.linalg.norm(full, axis=1)
+    assert share.min() < 0.2
+    np.testing.assert_allclose(less, share[:, None] * full, atol=1e-12)
+
+
+def test_a_wheel_that_nearly_stands_steers_nothing() -> None:
+    """Damped by h0 = 0.01 N m s: half at h0, nothing at rest, and never more than 1 / (2 h0)."""
+    speed = np.array([[0.0], [0.01 / JW], [-0.01 / JW], [73.0]])
+    push, still = np.array([0.0, 0.0, 1.0]), np.zeros(2)
+    eta, _ = steer(push, still, speed, JW, 0.01, 0.01)
+    np.testing.assert_allclose(eta[:3, 1], [0.0, 50.0, -50.0], rtol=1e-12)
+    assert eta[3, 1] == pytest.approx(1.0 / (JW * 73.0), rel=1e-4)  # 7.3e-5 less
+    np.testing.assert_array_equal(eta[:, 2], 0.0)
 
 
 def test_a_wheel_at_rest_has_no_answer() -> None:

@@ -1,0 +1,62 @@
+"""Actuators of several kinds side by side, each of which obeys its own field of the command."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mjspace.actuators import Actuators, State
+from mjspace.contract import Array, Measurement
+from mjspace.errors import FlightError
+
+
+@dataclass(frozen=True)
+class Together:
+    """All that acts on a batch of vehicles; the fields of their states have different names."""
+
+    kinds: tuple[Actuators, ...]
+
+    @property
+    def stateful(self) -> bool:
+        """Whether any must act in every integration step."""
+        return any(kind.stateful for kind in self.kinds)
+
+    @property
+    def masses(self) -> Callable[[State], dict[str, tuple[int, Array]]] | None:
+        """The method of the kind that burns what it carries; None where none does."""
+        return next((m for kind in self.kinds if (m := getattr(kind, "masses", None))), None)
+
+    def reset(self, vehicles: int) -> State:
+        """Return the state of all at the start."""
+        return {name: a for kind in self.kinds for name, a in kind.reset(vehicles).items()}
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, tuple[Array, ...], Array]:
+        """Return (state, what each kind gives, saturated) as ``Actuators.act`` does.
+
+        Raises:
+            FlightError: the command has not what one of them takes.
+        """
+        given, cut = [], []
+        for kind in self.kinds:
+            try:
+                after, torque, saturated = kind.act(state, command, truth, step)
+            except Exception as error:
+                raise FlightError(f"the law's command has no {kind.takes}: {error}") from error
+            state = state | after
+            given.append(torque)
+            cut.append(saturated)
+        return state, tuple(given), np.concatenate(cut, axis=-1)
+
+    def seen(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth with what the motors themselves show."""
+        for kind in self.kinds:
+            truth = kind.seen(state, truth)
+        return truth
+
+    def logged(self, given: Sequence[tuple[Array, ...]]) -> dict[str, Array]:
+        """Return the fields of /command for what ``act`` gave in several periods."""
+        columns = zip(*given, strict=True)
+        return {k.logged_as: np.array(c) for k, c in zip(self.kinds, columns, strict=True)}
