@@ -75,7 +75,9 @@ class VariableStructure:
     radius: float = gain("m", default=1e4)
     """re, that K is made for."""
     mass: float = gain("kg", default=100.0)
-    """m."""
+    """m, at the start."""
+    tank: float = gain("kg", default=0.0)
+    """Propellant at the start: what its gauge shows to be gone makes m less. 0: m stays."""
     thrust_range: Array = gain("N", (2,), default=(50.0, 320.0))
     """Least, without which no torque is left, and largest."""
     gimbal_limit: float = gain("rad", default=np.radians(20.0))
@@ -107,11 +109,20 @@ class VariableStructure:
         Z, S, asked, given = kernels.variable_structure(
             seen.attitude, seen.rate, seen.position, seen.velocity,
             wanted.attitude, wanted.position, wanted.velocity, wanted.linear_acceleration,
-            *self._gains,
+            *self._gains[:-2], self._engine(seen.propellant), self._gains[-1],
         )  # fmt: skip
         error = seen.position - wanted.position
         shown = Signals(error, Z, S, asked[..., :1], asked[..., :0:-1])
         return State(cut), burning(cut, given), shown
+
+    def _engine(self, propellant: Array) -> Array:
+        """Return the engine's numbers with the mass of now, (..., 8)."""
+        engine: Array = self._gains[-2]
+        if not self.tank or not propellant.shape[-1]:
+            return engine
+        engine = np.repeat(engine[None], propellant.size, axis=0)
+        engine[:, _MASS] -= self.tank - propellant.ravel()
+        return engine.reshape(*propellant.shape[:-1], -1)
 
     @cached_property
     def _gains(self) -> tuple[Array, ...]:
@@ -124,6 +135,7 @@ class VariableStructure:
         return feedback, numbers[0], self.surface_gain, self.loop_share, *numbers[1:]
 
 
+_MASS = 1  # its place among the engine's numbers
 _COORDINATES = {"polar": kernels.POLAR, "scaled": kernels.SCALED, "frozen": kernels.FROZEN}
 
 
