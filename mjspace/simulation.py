@@ -80,6 +80,10 @@ class _Flight:
         self.sensors, self.law_state = start.sensors, start.law
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
         self.batch.state[:] = start.physics
+        for name, values in start.model.items():
+            self.batch.expand(name)[:] = values
+        if start.model:
+            self.batch.set_const()
         self.applied = [self._applied(kind.acts_on) for kind in assembly.actuators.kinds]
         self.sensordata = self.batch.bind("sensordata")
         self.actuators, self.actuator_state = assembly.actuators, start.actuators

@@ -29,6 +29,8 @@ class Start:
     """The law's state before it steps in this period; None: the law is reset here."""
     actuators: dict[str, Array] = field(default_factory=dict)
     """The actuators' state at the period's start."""
+    model: dict[str, Array] = field(default_factory=dict)
+    """Fields of MuJoCo's model in which the vehicles differ, (N, ...)."""
 
 
 def last_period(scenario: Scenario) -> int:
