@@ -1,13 +1,17 @@
 # The set-up happens by itself, once, and again when what it reads changes.
 bin := .venv/bin
 
-.PHONY: run test lint format validation constraints clean
+.PHONY: run test flights lint format validation constraints clean
 
 run: .venv/run.done
 	$(bin)/mjspace run contraction-adaptive --plot --video
 
 test: .venv/dev.done
 	$(bin)/python -m pytest -n 2 --dist loadfile
+
+# Every scenario from its beginning to its end, and the campaigns: about a quarter of an hour.
+flights: .venv/dev.done
+	$(bin)/python -m pytest -n 2 -m long
 
 lint: .venv/dev.done
 	$(bin)/ruff check

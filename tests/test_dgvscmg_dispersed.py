@@ -9,7 +9,7 @@ import pytest
 BENCHMARK = Path(__file__).parents[1] / "benchmarks/dgvscmg_dispersed.py"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_of_twelve_fly_within_their_limits_and_reject_their_vibration() -> None:
     here = runpy.run_path(str(BENCHMARK))
     draw = here["drawn"](here["SEED"], 12)
