@@ -243,6 +243,6 @@ def _speeds(measurement: Measurement) -> Array:
 
 
 def _carried(measurement: Measurement) -> Array:
-    """Return how fast each rotor's carrier turns about its axis [rad/s]: the wheel's, (..., 3)."""
-    rate, angle, turn = measurement.rate, measurement.gimbal_angle, measurement.gimbal_rate
-    return np.concatenate([np.zeros_like(turn), steering.carried(rate, angle, turn)], axis=-1)
+    """Return how fast each rotor's carrier turns about its axis [rad/s], (..., 3)."""
+    seen = measurement
+    return steering.carried(seen.rate, seen.gimbal_angle, seen.gimbal_rate)

@@ -107,12 +107,12 @@ def momentum(
 
 
 def carried(rate: Array, gimbal_angle: Array, gimbal_rate: Array) -> Array:
-    """Return how fast the inner gimbal carries the wheel round about its axis [rad/s], (..., 1).
+    """Return how fast the hinges' axes are carried round [rad/s], (..., 3): the wheel's alone.
 
     It is s . w - do' sin(di), with the bus's ``rate`` (..., 3). A motor that turns the wheel by u
     on that axis gives Jw (W + carried)' = u, exactly; the thesis has Jw W' = u.
     """
-    given: Array = _carried(rate, gimbal_angle, gimbal_rate)[..., None]
+    given: Array = _carried.ufunc(rate, gimbal_angle, gimbal_rate)  # asked every inner period
     return given
 
 
@@ -197,7 +197,8 @@ def _momentum(inertia: Any, rate: Any, angle: Any, speed: Any, Jw: Any, momentum
         momentum[i] = _dot(inertia[i], rate) + Jw * speed[0] * s[i]
 
 
-@guvectorize(["void(f8[:],f8[:],f8[:],f8[:])"], "(v),(g),(g)->()", cache=True)
+@guvectorize(["void(f8[:],f8[:],f8[:],f8[:])"], "(v),(g),(g)->(v)", cache=True)
 def _carried(rate: Any, angle: Any, turn: Any, carried: Any) -> None:
     s, _, _ = _axes(angle)
-    carried[0] = _dot(s, rate) + s[2] * turn[0]
+    carried[0] = carried[1] = 0.0
+    carried[2] = _dot(s, rate) + s[2] * turn[0]

@@ -75,8 +75,9 @@ def test_the_wheel_s_wanted_speed_is_the_integral_of_what_the_steering_wants() -
     measurement = seen(2)
     state, command, *_ = flown(cascade(), measurement)
     # about its axis: with what the bus and the outer gimbal turn there
-    with_carrier = measurement.wheel_speed + carried(
-        measurement.rate, measurement.gimbal_angle, measurement.gimbal_rate
+    with_carrier = (
+        measurement.wheel_speed
+        + carried(measurement.rate, measurement.gimbal_angle, measurement.gimbal_rate)[..., 2:]
     )
     wanted = with_carrier + 3e-4 * command.acceleration[:, 2:]
     np.testing.assert_allclose(state.wheel_wanted, wanted, rtol=1e-14)
