@@ -11,10 +11,16 @@ ENGINE = ("engine_outer", "engine_inner", "engine_thrust")
 """The motors of an engine on gimbals, in the order of ``ctrl``."""
 
 
+def is_thruster(motor: str) -> bool:
+    """Tell whether the motor of that name is a reaction-control thruster."""
+    return re.fullmatch(r"thruster_\d+", motor) is not None
+
+
 def of(model: Any, wheels: int, driven: Collection[str], *, engine: bool = False) -> dict[str, Any]:
     """Return ``plant.Vehicle``'s fields for that many reaction wheels, and ``driven`` hinges.
 
-    With an ``engine``, its gimbals are gimbals, and its thrust is a motor.
+    With an ``engine``, its gimbals are gimbals, and its thrust is a motor. Reaction-control
+    thrusters, which the model has or has not, are motors and come last.
 
     Raises:
         ValueError: no motor turns one of the hinges, or a motor is left without its drive.
@@ -34,7 +40,7 @@ def of(model: Any, wheels: int, driven: Collection[str], *, engine: bool = False
         "gimbal_dof": _where(model.joint(name).dofadr for name in gimbals),
         "gimbal_qpos": _where(model.joint(name).qposadr for name in gimbals),
         "drive_dof": _where(model.joint(name).dofadr for name in drives),
-        "motors": tuple(motors),
+        "motors": (*motors, *filter(is_thruster, _names(model))),
         "strut_qpos": _where(joint.qposadr for joint in _struts(model)),
         **{name: _sensor(model, name) for name in ("momentum", "kinetic", "environment")},
     }
@@ -55,13 +61,18 @@ def _by_motor(model: Any, driven: Collection[str]) -> list[str]:
 
 def _engine(model: Any) -> list[str]:
     """Return the engine's motors; they must be all that there are."""
-    motors = [model.actuator(i).name for i in range(model.nu)]
+    motors = [name for name in _names(model) if not is_thruster(name)]
     if motors != list(ENGINE):
         raise ValueError(
             f"plant.engine: wants the motors {', '.join(ENGINE)}, as plant.model = 'lander' has "
             f"them; here they are {', '.join(motors) or 'none'}"
         )
     return motors
+
+
+def _names(model: Any) -> list[str]:
+    """Return the names of all motors, in the order of ``ctrl``."""
+    return [model.actuator(i).name for i in range(model.nu)]
 
 
 def _struts(model: Any) -> list[Any]:

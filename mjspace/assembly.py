@@ -20,7 +20,8 @@ from mjspace.one_by_one import OneByOne
 from mjspace.plant import Vehicle
 from mjspace.scenario import Component, Scenario
 from mjspace.sensors import SensorSuite
-from mjspace.tables import PlantTable
+from mjspace.tables import PlantTable, Rates
+from mjspace.thrusters import Thrusters
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         "wheel_inertia": vehicle.wheel_inertia,
         "control_period": scenario.rates.control,
         "inner_period": scenario.rates.physics,
+        **_of_thrusters(scenario.plant),
     }
     flown: dict[str, Any] = {}
     sources = {}
@@ -111,7 +113,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             friction,
             ripple,
         ),
-        actuators=_actuators(vehicle, scenario.plant),
+        actuators=_actuators(vehicle, scenario.plant, scenario.rates),
         reference=reference,
         law=law if getattr(law, "batched", False) else OneByOne(law),
         disturbance=disturbance,
@@ -138,18 +140,34 @@ def _in_log(role: str, kind: str) -> str:
     return f"{role}.py:{name}" if place.endswith(".py") else kind
 
 
-def _actuators(vehicle: Vehicle, table: PlantTable) -> Together:
+def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
     kinds: list[Actuators] = []
     if table.drives:
-        kinds.append(MotorDrives.of(vehicle, [table.drives[name] for name in vehicle.motors]))
+        driven = [table.drives[name] for name in vehicle.motors if name in table.drives]
+        kinds.append(MotorDrives.of(vehicle, driven))
     if table.engine is not None:
         kinds.append(GimballedEngine.of(vehicle, table.engine))
-    if table.wheels.axes or not (kinds or table.ideal_thrusters):
+    if table.wheels.axes or not (kinds or table.ideal_thrusters or table.rcs):
         wheels = ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit)
         kinds.append(wheels)
     if table.ideal_thrusters:
         kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
+    if table.rcs is not None:
+        kinds.append(Thrusters.of(vehicle, table.rcs, rates))
     return Together(tuple(kinds))
+
+
+def _of_thrusters(table: PlantTable) -> dict[str, Any]:
+    """Return what a law may want to know of the vehicle's thrusters."""
+    rcs = table.rcs
+    if rcs is None:
+        return {}
+    return {
+        "thruster_positions": np.array(rcs.positions),
+        "thruster_directions": np.array(rcs.unit_directions),
+        "thruster_force": np.full(len(rcs.positions), rcs.thrust),
+        "thruster_minimum_on": rcs.minimum_on,
+    }
 
 
 def _friction(table: PlantTable) -> dict[str, float]:

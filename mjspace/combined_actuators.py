@@ -1,6 +1,6 @@
 """Actuators of several kinds side by side, each of which obeys its own field of the command."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,10 +22,10 @@ class Together:
         """Whether any must act in every integration step."""
         return any(kind.stateful for kind in self.kinds)
 
-    @property
-    def masses(self) -> Callable[[State], dict[str, tuple[int, Array]]] | None:
-        """The method of the kind that burns what it carries; None where none does."""
-        return next((m for kind in self.kinds if (m := getattr(kind, "masses", None))), None)
+    def masses(self, state: State) -> list[tuple[str, int, Array]]:
+        """Return each field of MuJoCo's model that has changed, its body and the values."""
+        burning = [kind.masses(state) for kind in self.kinds if hasattr(kind, "masses")]
+        return [(name, *change) for masses in burning for name, change in masses.items()]
 
     def reset(self, vehicles: int) -> State:
         """Return the state of all at the start."""

@@ -13,11 +13,14 @@ from mjspace.components import nearest
 from mjspace.contract import Array
 from mjspace.hinge_tables import Hinge
 from mjspace.landing_tables import Ground
+from mjspace.rcs_tables import Rcs
 from mjspace.tables import Part, PlantTable
 
 _ASSETS = Path(str(files("mjspace.assets")))
 _STOP_SPRING = [0.005, 1.0]  # s, damping ratio: of what turns there, whatever its inertia
 _STOP_HARDNESS = [0.95, 0.99, 0.001, 0.5, 2.0]  # MuJoCo's solimp
+_HYDRAZINE = 1010.0  # kg/m^3 at 20 deg C
+_UNSEEN = 5  # a group of sites that no picture shows
 _WHEEL_GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
 
 
@@ -34,6 +37,8 @@ def compose(table: PlantTable) -> Any:
         _attach_part(spec, name, part)
     for name, hinge in table.hinges.items():
         _bear(_hinge(spec, name), hinge)
+    if table.rcs is not None:
+        _add_thrusters(spec, table.rcs)
     if table.ground is not None:
         _attach_ground(spec, table.ground)
     stops = any(hinge.stops for hinge in table.hinges.values())
@@ -120,6 +125,20 @@ def _bear(joint: Any, hinge: Hinge) -> None:
         joint.limited = True
         joint.range = hinge.stops
         joint.solref_limit, joint.solimp_limit = _STOP_SPRING, _STOP_HARDNESS
+
+
+def _add_thrusters(spec: Any, rcs: Rcs) -> None:
+    """Let each thruster push on the bus at its place; put the propellant at the body origin."""
+    bus = spec.body("bus")
+    for index, (place, way) in enumerate(zip(rcs.positions, rcs.unit_directions, strict=True)):
+        name = f"thruster_{index}"
+        bus.add_site(name=name, pos=place, group=_UNSEEN)
+        pushes = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": name}
+        spec.add_actuator(name=name, gear=[*way, 0.0, 0.0, 0.0], **pushes)
+    if rcs.propellant is not None:
+        radius = np.cbrt(rcs.propellant / (4.0 / 3.0 * np.pi * _HYDRAZINE))
+        tank = bus.add_body(name="rcs_tank", mass=rcs.propellant, explicitinertial=True)
+        tank.inertia = np.full(3, 0.4 * rcs.propellant * radius**2)
 
 
 def _attach_ground(spec: Any, ground: Ground) -> None:

@@ -41,9 +41,9 @@ class Measurement(NamedTuple):
     ground_velocity: Array = np.zeros(0)
     """What a velocimeter shows: of the bus, body axes [m/s], shape (..., 3)."""
     thrust: Array = np.zeros(0)
-    """Of the engine [N], shape (..., 1)."""
+    """Of the engine, then of each thruster [N], shape (..., n)."""
     propellant: Array = np.zeros(0)
-    """Left in the tank [kg], shape (..., 1)."""
+    """Left in the tank, the engine's before the thrusters' [kg], shape (..., n)."""
     contact: Array = np.zeros(0)
     """1.0 while at least two feet stand on the ground, else 0.0, shape (..., 1)."""
     wheel_angle: Array = np.zeros(0)
@@ -107,6 +107,13 @@ class ThrustCommand(NamedTuple):
     """Angles of the hinges, the outer before the inner [rad], shape (..., 2)."""
 
 
+class PulseCommand(NamedTuple):
+    """What a law asks of on/off thrusters."""
+
+    on_time: Array
+    """For how long each is on, from the beginning of the control period [s], shape (..., n)."""
+
+
 class Law(Protocol):
     """A control law: gains in, two pure functions, no hidden state.
 
@@ -115,7 +122,8 @@ class Law(Protocol):
     during a flight. A law that says ``batched = True`` handles any leading axes; another sees the
     arrays of one vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any
     command with that field; motors with an electrical side a ``VoltageCommand``; an engine on
-    gimbals a ``ThrustCommand``. ``reference`` is what the scenario's reference says: ``Wanted``.
+    gimbals a ``ThrustCommand``, on/off thrusters a ``PulseCommand``. ``reference`` is what the
+    scenario's reference says: ``Wanted``.
 
     A batched law may have an inner loop as well, for what must be quick: a method
     ``inner(state, time, command, measurement) -> (state, command)``, pure like ``step``, that is

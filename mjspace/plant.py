@@ -47,7 +47,7 @@ class Vehicle:
     strut_qpos: Any
     """Index of each landing leg's strut in ``qpos``, shape (l,): positive where it is pressed."""
     motors: tuple[str, ...]
-    """Names of the hinges that motors turn, in the order of ``ctrl``."""
+    """Names of the hinges that motors turn, then of the thrusters, in the order of ``ctrl``."""
     torque_limit: float
     """Largest motor torque [N m]; inf where there is none."""
     speed_limit: float
@@ -103,8 +103,9 @@ def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
         KeyError: ``model`` lacks one of the vehicle's joints or sensors.
     """
     reaction_wheels = len(vehicle.wheel_axes)
-    engine = vehicle.motors == addresses.ENGINE
-    driven = () if engine else vehicle.motors[reaction_wheels:]
+    hinges = [name for name in vehicle.motors if not addresses.is_thruster(name)]
+    engine = tuple(hinges) == addresses.ENGINE
+    driven = () if engine else hinges[reaction_wheels:]
     found = addresses.of(model, reaction_wheels, driven, engine=engine)
     return replace(vehicle, model=model, **found)
 

@@ -10,6 +10,8 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from mjspace import environment, mujoco_log
+from mjspace.actuators import Actuators
+from mjspace.addresses import is_thruster
 from mjspace.assembly import Assembly
 from mjspace.columns import Columns
 from mjspace.contract import Array, Measurement, Wanted
@@ -18,6 +20,7 @@ from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.start import Start, last_period
 from mjspace.tape import Block, Tape, until_trouble
+from mjspace.thrusters import Thrusters
 
 BLOCK_PERIODS = 500
 BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
@@ -84,10 +87,9 @@ class _Flight:
             self.batch.expand(name)[:] = values
         if start.model:
             self.batch.set_const()
-        self.applied = [self._applied(kind.acts_on) for kind in assembly.actuators.kinds]
+        self.applied = [self._applied(kind) for kind in assembly.actuators.kinds]
         self.sensordata = self.batch.bind("sensordata")
         self.actuators, self.actuator_state = assembly.actuators, start.actuators
-        self.masses = assembly.actuators.masses
         self.inner = getattr(assembly.law, "inner", None)
         self.push = None
         if assembly.disturbance is not None:
@@ -131,8 +133,8 @@ class _Flight:
     def _fly_period(
         self, tape: Tape, period: int, now: float, reference: Wanted, *, flown: bool
     ) -> None:
-        if self.masses is not None:
-            self._weigh(self.masses(self.actuator_state))
+        if masses := self.actuators.masses(self.actuator_state):
+            self._weigh(masses)
         physics = self.batch.state.copy()
         truth = self._truth(physics)
         tape.physics.append(physics)
@@ -190,18 +192,21 @@ class _Flight:
             view[:] = torque
         return given, saturated
 
-    def _weigh(self, masses: dict[str, tuple[int, Array]]) -> None:
+    def _weigh(self, masses: list[tuple[str, int, Array]]) -> None:
         """Give bodies the mass that they have by now, and keep it for the period."""
-        for name, (body, values) in masses.items():
+        for name, body, values in masses:
             self.batch.expand(name)[:, body] = values
         self.batch.set_const()
 
-    def _applied(self, array: str) -> Array:
+    def _applied(self, kind: Actuators) -> Array:
         """Return the view of MuJoCo's input that actuators of a kind fill."""
-        vehicle = self.assembly.vehicle
-        bus_turn = slice(3, 6)  # the free joint comes first, its torque in body axes
-        view: Array = self.batch.bind(array)
-        return view[:, bus_turn if array == "qfrc_applied" else slice(len(vehicle.motors))]
+        view: Array = self.batch.bind(kind.acts_on)
+        if kind.acts_on == "qfrc_applied":
+            return view[:, 3:6]  # the free joint comes first, its torque in body axes
+        motors = self.assembly.vehicle.motors
+        others = sum(not is_thruster(name) for name in motors)
+        of_kind = slice(others, None) if isinstance(kind, Thrusters) else slice(others)
+        return view[:, of_kind]
 
     def _truth(self, physics: Array) -> Measurement:
         return self.actuators.seen(self.actuator_state, self.columns.truth(physics))

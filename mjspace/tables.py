@@ -27,6 +27,7 @@ from mjspace.fields import (
 from mjspace.hinge_tables import Bearing, Hinge
 from mjspace.landing_tables import Engine, Ground
 from mjspace.quantity import whole_number
+from mjspace.rcs_tables import Rcs
 
 
 class Rates(Table):
@@ -130,6 +131,8 @@ class PlantTable(Table):
     command's ``torque`` or, beside motors or an engine, its ``thruster_torque``."""
     engine: Engine | None = None
     """What its engine on gimbals does, of a model that has one; no wheels then."""
+    rcs: Rcs | None = None
+    """Its reaction-control thrusters; none when left out."""
     ground: Ground | None = None
     """What is below it; nothing when left out."""
 
