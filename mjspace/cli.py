@@ -7,10 +7,11 @@ early), 2 bad input. Modules are imported when a command needs them: ``--help`` 
 import json
 import warnings
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
+from mjspace.errors import InputError
 from mjspace.options import Json, LogFile, Out, Plot, Set, Video
 from mjspace.terminal import finish, open_log, print_warning, progress_bar, told_in_one_line
 from mjspace.validation.command import validate
@@ -69,7 +70,12 @@ def info(
 
 @app.command()
 def run(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    scenario: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")
+    ] = "",
+    every: Annotated[
+        bool, typer.Option("--all", help="Every scenario that comes with mjspace, on all cores.")
+    ] = False,
     overrides: Set = [],  # noqa: B006
     seed: Annotated[int | None, typer.Option(help="Seed of every random stream.")] = None,
     out: Out = None,
@@ -85,12 +91,32 @@ def run(
 
     extra = [] if seed is None else [f"seed={seed}"]
     extra += [f"duration={duration!r}"] if duration else []
+    if every == bool(scenario):
+        raise InputError("run: give one SCENARIO, or --all; 'mjspace list' shows them")
+    if every:
+        if plot_it or video:
+            raise InputError("--all: has no pictures; plot and render the logs that matter")
+        _run_all([*overrides, *extra], output_folder(out, "all"), as_json)
     loaded, folder = load(scenario, [*overrides, *extra])
     assembly = assemble(loaded, folder)
     with progress_bar(loaded.duration, "flying") as progress:
         path = output_folder(out, loaded.name) / "flight.mcap"
         result = fly_to_log(assembly, path, progress=progress)
     finish(result, plot_it, video, as_json)
+
+
+def _run_all(overrides: list[str], out: Path, as_json: bool) -> NoReturn:
+    from mjspace import every
+    from mjspace.loading import scenario_names
+
+    with progress_bar(1.0, "flying", count="") as progress:
+        outcomes = every.fly(scenario_names(), overrides, out, progress)
+    if as_json:
+        print(json.dumps(every.data(outcomes), indent=2))
+    else:
+        every.show(outcomes)
+        print(f"logs   {out}")
+    raise typer.Exit(0 if all(outcome.is_right for outcome in outcomes) else 1)
 
 
 @app.command()
@@ -115,7 +141,6 @@ def replay(
 ) -> None:
     """Fly a log again: to prove it, or under another law."""
     from mjspace import replay as again
-    from mjspace.errors import InputError
     from mjspace.flight import output_folder
     from mjspace.loading import component
 
@@ -155,7 +180,7 @@ def render(
     at: Annotated[float | None, typer.Option(help="Time of a still [s]; else the end.")] = None,
 ) -> None:
     """Render a log to a video or a picture, offscreen."""
-    from mjspace.errors import InputError, blamed_on
+    from mjspace.errors import blamed_on
     from mjspace.render import render as to_picture
 
     width, _, height = size.partition("x")

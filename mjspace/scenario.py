@@ -115,6 +115,8 @@ class Scenario(Table):
     reference: Component
     law: Component
     checks: list[Check] = []
+    verdict: Literal["PASS", "FAIL"] = "PASS"
+    """What is right: a scenario may be there to show a failure."""
     events: list[Event] = []
 
     @model_validator(mode="after")

@@ -76,6 +76,9 @@ def test_json_is_all_there_is(tmp_path: Path) -> None:
     ("arguments", "parts"),
     [
         (["run", "contraction-idael"], ["contraction-ideal"]),
+        (["run"], ["SCENARIO", "--all"]),
+        (["run", "contraction-ideal", "--all"], ["SCENARIO", "--all"]),
+        (["run", "--all", "--plot"], ["--all", "pictures"]),
         (["run", "nowhere.toml"], ["nowhere.toml"]),
         (
             ["run", "contraction-ideal", "--set", "law.rate_gian=1"],

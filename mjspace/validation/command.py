@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
+from mjspace import workers
 from mjspace.errors import InputError, blamed_on
 from mjspace.options import Json
 from mjspace.terminal import progress_bar
-from mjspace.validation import workers
 
 
 def validate(
@@ -44,7 +44,7 @@ def validate(
             table.show_passport(issued)
         raise typer.Exit(0 if issued.passed else 1)
 
-    workers.warm_up()
+    workers.warm_up("mjspace.validation.benchmarks")
     from mjspace.flight import output_folder
     from mjspace.validation import report, suite, table
     from mjspace.validation.basilisk import compared

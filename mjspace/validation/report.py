@@ -5,7 +5,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from mjspace.validation import figures, wording, workers
+from mjspace import workers
+from mjspace.validation import figures, wording
 from mjspace.validation.benchmark import FAULTS
 from mjspace.validation.results import Results, Section
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from mjspace import workers
 from mjspace.provenance import software
-from mjspace.validation import benchmarks, workers
+from mjspace.validation import benchmarks
 from mjspace.validation.benchmark import (
     FAULTS,
     Benchmark,

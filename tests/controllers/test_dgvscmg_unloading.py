@@ -80,4 +80,4 @@ def test_momentum_leaves_by_the_thrusters_alone() -> None:
     change = rows["momentum"][-1] - rows["momentum"][0]
     assert np.linalg.norm(brought) > 1e-3
     # the bus turns by some 1e-4 rad while a torque is held
-    np.testing.assert_allclose(change, brought, atol=1e-3 * np.linalg.norm(brought))
+    np.testing.assert_allclose(change, brought, atol=1e-3 * float(np.linalg.norm(brought)))

@@ -1,6 +1,7 @@
 """Processes that fly and draw, one a core, forked from one that has imported everything."""
 
 import os
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import forkserver, get_all_start_methods, get_context
@@ -12,10 +13,10 @@ _CONTEXT = get_context(_METHOD)
 _Result = TypeVar("_Result")
 
 
-def warm_up() -> None:
-    """Let the workers' parent begin to import, which takes seconds; the caller may do the same."""
+def warm_up(module: str) -> None:
+    """Let the workers' parent begin to import ``module``, which takes seconds."""
     if _METHOD == "forkserver":
-        _CONTEXT.set_forkserver_preload(["mjspace.validation.benchmarks"])
+        _CONTEXT.set_forkserver_preload([module])
         forkserver.ensure_running()
 
 
@@ -23,7 +24,7 @@ def each(
     calls: Sequence[tuple[Callable[..., _Result], Any]],
 ) -> Iterator[tuple[int, _Result]]:
     """Make ``calls``, functions with their argument; yield (index, result) as they are done."""
-    warm_up()
+    warm_up(calls[0][0].__module__)
     workers = min(os.cpu_count() or 1, len(calls))
     with ProcessPoolExecutor(workers, _CONTEXT, initializer=_quiet) as pool:
         futures = {pool.submit(call, given): index for index, (call, given) in enumerate(calls)}
@@ -36,6 +37,7 @@ def each(
 
 
 def _quiet() -> None:
-    from mjspace import mujoco_log  # here: this module must not cost the time that it saves
+    from mjspace import mujoco_log, terminal  # here: this module must not cost what it saves
 
     mujoco_log.silence()
+    warnings.showwarning = terminal.print_warning
