@@ -28,9 +28,12 @@ class Actuators(Protocol):
         """What a command must have."""
 
     acts_on: ClassVar[str]
-    """MuJoCo's array that ``act`` fills: "ctrl", or "qfrc_applied" for the bus's torque."""
-    stateful: ClassVar[bool]
-    """Whether they must act in every integration step; else once in a control period."""
+    """MuJoCo's array that ``act`` fills: "ctrl", "qfrc_applied" for the bus's torque, or "userdata"
+    for its magnetic moment [A m^2], body axes, in the environment's field."""
+
+    @property
+    def stateful(self) -> bool:
+        """Whether they must act in every integration step; else once in a control period."""
 
     def reset(self, vehicles: int) -> State:
         """Return the state at the start."""

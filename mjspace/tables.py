@@ -26,6 +26,7 @@ from mjspace.fields import (
 )
 from mjspace.hinge_tables import Bearing, Hinge
 from mjspace.landing_tables import Engine, Ground
+from mjspace.magnetic_tables import Magnetorquers
 from mjspace.quantity import whole_number
 from mjspace.rcs_tables import Rcs
 
@@ -129,6 +130,9 @@ class PlantTable(Table):
     ideal_thrusters: bool = False
     """Whether a torque that the law asks for acts on the bus as if by thrusters, as it is: its
     command's ``torque`` or, beside motors or an engine, its ``thruster_torque``."""
+    magnetorquers: Magnetorquers | None = None
+    """None when left out; in an environment with a magnetic field they obey the command's
+    ``dipole``."""
     engine: Engine | None = None
     """What its engine on gimbals does, of a model that has one; no wheels then."""
     rcs: Rcs | None = None
