@@ -118,7 +118,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             ripple,
         ),
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
-        actuators=_actuators(vehicle, scenario.plant, scenario.rates),
+        actuators=_part("plant", _actuators, vehicle, scenario.plant, scenario.rates),
         reference=reference,
         law=law if getattr(law, "batched", False) else OneByOne(law),
         disturbance=disturbance,
@@ -154,8 +154,8 @@ def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
         kinds.append(GimballedEngine.of(vehicle, table.engine))
     others = table.ideal_thrusters or table.rcs or table.magnetorquers
     if table.wheels.axes or not (kinds or others):
-        wheels = ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit)
-        kinds.append(wheels)
+        limits = vehicle.torque_limit, vehicle.speed_limit
+        kinds.append(ReactionWheels(vehicle.wheel_axes, *limits, table.wheels.allocation))
     if table.ideal_thrusters:
         kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
     if table.rcs is not None:
