@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import numba
 import numpy as np
@@ -28,9 +28,12 @@ class Actuators(Protocol):
         """What a command must have."""
 
     acts_on: ClassVar[str]
-    """MuJoCo's array that ``act`` fills: "ctrl", or "qfrc_applied" for the bus's torque."""
-    stateful: ClassVar[bool]
-    """Whether they must act in every integration step; else once in a control period."""
+    """MuJoCo's array that ``act`` fills: "ctrl", "qfrc_applied" for the bus's torque, or "userdata"
+    for its magnetic moment [A m^2], body axes, in the environment's field."""
+
+    @property
+    def stateful(self) -> bool:
+        """Whether they must act in every integration step; else once in a control period."""
 
     def reset(self, vehicles: int) -> State:
         """Return the state at the start."""
@@ -50,7 +53,7 @@ class Actuators(Protocol):
 
 @dataclass(frozen=True)
 class ReactionWheels:
-    """Wheels that are all alike, with a pseudo-inverse allocation.
+    """Wheels that are all alike, and share a torque by least norm or by least peak.
 
     Friction is not compensated: what the bearings take is the law's to find out.
     """
@@ -61,16 +64,21 @@ class ReactionWheels:
     """Largest motor torque [N m]."""
     speed_limit: float = inf
     """Largest speed relative to the bus [rad/s]."""
+    shared_by: Literal["least_squares", "least_peak"] = "least_squares"
+    """Of all motor torques that would do, those of least norm, or whose largest is least."""
     logged_as: ClassVar[str] = "wheel_torque"
     takes: ClassVar[str] = "torque of shape (..., 3) [N m]"
     acts_on: ClassVar[str] = "ctrl"
     stateful: ClassVar[bool] = False
     allocation: Array = field(init=False, repr=False)
     """Motor torques for each unit of torque on the bus, shape (n, 3): -pinv(axes^T)."""
+    spare: Array = field(init=False, repr=False)
+    """Motor torques that give the bus none and may be added, shape (n,); zero for least norm."""
     _limits: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "allocation", -np.linalg.pinv(self.axes.T))
+        object.__setattr__(self, "spare", self._spare())
         object.__setattr__(self, "_limits", np.array([self.torque_limit, self.speed_limit]))
 
     def reset(self, vehicles: int) -> State:
@@ -92,7 +100,7 @@ class ReactionWheels:
 
         ``torque`` (..., 3) is wanted on the bus, body axes [N m]; ``wheel_speed`` (..., n) is
         relative to the bus [rad/s]. ``ctrl`` [N m] is the motors' torque on their rotors, whose
-        reaction turns the bus: of all that would give ``torque``, the one of least norm, each
+        reaction turns the bus: of all that would give ``torque``, as ``shared_by`` says, each
         wheel's then cut to the torque limit. A wheel at its speed limit or beyond gets no torque
         that would raise its speed; as a command is held, it may pass the limit by what one control
         period adds. ``saturated`` is 1.0 for a wheel that does not get the torque allotted to it,
@@ -100,9 +108,23 @@ class ReactionWheels:
         """
         # Past Numba's wrapper, and with both limits in one array: 1.6 us a call, not 2.6.
         given: tuple[Array, Array] = _motor_torque.ufunc(
-            torque, wheel_speed, self.allocation, self._limits
+            torque, wheel_speed, self.allocation, self.spare, self._limits
         )
         return given
+
+    def _spare(self) -> Array:
+        """Return ``spare``; ValueError where least peak has no choice, or more than one number."""
+        if self.shared_by == "least_squares":
+            return np.zeros(len(self.axes))
+        _, singular, right = np.linalg.svd(self.axes.T)
+        free = len(self.axes) - int(np.sum(singular > 1e-9))
+        if free != 1:
+            raise ValueError(
+                f"wheels.allocation: least_peak wants one wheel more than their axes span, as four "
+                f"of a pyramid are; here it is {free} more: least_squares would do"
+            )
+        one: Array = right[-1]
+        return np.where(np.abs(one) < 1e-12, 0.0, one)
 
 
 @dataclass(frozen=True)
@@ -140,18 +162,34 @@ class IdealThrusters:
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
 @numba.guvectorize(
-    ["void(f8[:], f8[:], f8[:, :], f8[:], f8[:], f8[:])"],
-    "(k),(n),(n,k),(m)->(n),(n)",
+    ["void(f8[:], f8[:], f8[:, :], f8[:], f8[:], f8[:], f8[:])"],
+    "(k),(n),(n,k),(n),(m)->(n),(n)",
     cache=True,
 )
 def _motor_torque(
-    torque: Any, speed: Any, allocation: Any, limits: Any, ctrl: Any, saturated: Any
+    torque: Any, speed: Any, allocation: Any, spare: Any, limits: Any, ctrl: Any, saturated: Any
 ) -> None:
     torque_limit, speed_limit = limits[0], limits[1]
     for i in range(speed.size):
         wanted = 0.0
         for k in range(torque.size):
             wanted += allocation[i, k] * torque[k]
+        ctrl[i] = wanted
+    # The largest of |ctrl + t spare| is least where two wheels are level: all t of such pairs are
+    # tried, and none, which stays where it is as good.
+    best, least = 0.0, np.abs(ctrl).max()
+    for i in range(speed.size):
+        for j in range(i):
+            for sign in (-1.0, 1.0):
+                slope = spare[i] + sign * spare[j]
+                if slope != 0.0:
+                    t, peak = -(ctrl[i] + sign * ctrl[j]) / slope, 0.0
+                    for k in range(speed.size):
+                        peak = max(peak, abs(ctrl[k] + t * spare[k]))
+                    if peak < least:
+                        best, least = t, peak
+    for i in range(speed.size):
+        wanted = ctrl[i] + best * spare[i]
         given = wanted
         if abs(given) > torque_limit:
             given = np.copysign(torque_limit, wanted)

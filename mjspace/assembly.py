@@ -15,6 +15,8 @@ from mjspace.components import construct, load_object, source_of
 from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.engine import GimballedEngine
 from mjspace.errors import blamed_on
+from mjspace.geomagnetism import FieldAlongOrbit, along
+from mjspace.magnetorquers import CoilSet
 from mjspace.motor_drives import MotorDrives
 from mjspace.one_by_one import OneByOne
 from mjspace.plant import Vehicle
@@ -37,6 +39,8 @@ class Assembly:
     """At time zero, (nv,)."""
     userdata: Array
     """The environment's parameters, one row (nuserdata,)."""
+    field: FieldAlongOrbit | None
+    """The Earth's magnetic field where the vehicle goes; None where there is none."""
     actuators: Together
     reference: ReferenceSource
     law: Law
@@ -113,7 +117,8 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             friction,
             ripple,
         ),
-        actuators=_actuators(vehicle, scenario.plant, scenario.rates),
+        field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
+        actuators=_part("plant", _actuators, vehicle, scenario.plant, scenario.rates),
         reference=reference,
         law=law if getattr(law, "batched", False) else OneByOne(law),
         disturbance=disturbance,
@@ -147,13 +152,18 @@ def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
         kinds.append(MotorDrives.of(vehicle, driven))
     if table.engine is not None:
         kinds.append(GimballedEngine.of(vehicle, table.engine))
-    if table.wheels.axes or not (kinds or table.ideal_thrusters or table.rcs):
-        wheels = ReactionWheels(vehicle.wheel_axes, vehicle.torque_limit, vehicle.speed_limit)
-        kinds.append(wheels)
+    others = table.ideal_thrusters or table.rcs or table.magnetorquers
+    if table.wheels.axes or not (kinds or others):
+        limits = vehicle.torque_limit, vehicle.speed_limit
+        kinds.append(ReactionWheels(vehicle.wheel_axes, *limits, table.wheels.allocation))
     if table.ideal_thrusters:
         kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
     if table.rcs is not None:
         kinds.append(Thrusters.of(vehicle, table.rcs, rates))
+    if table.magnetorquers is not None:
+        coils = table.magnetorquers
+        axes = np.array(coils.axes) / np.linalg.norm(coils.axes, axis=1, keepdims=True)
+        kinds.append(CoilSet(axes, coils.dipole_limit or np.inf, coils.time_constant))
     return Together(tuple(kinds))
 
 

@@ -37,6 +37,7 @@ class Columns:
         sensors = assembly.scenario.sensors
         self.navigates = any(getattr(sensors, name) is not None for name in NAVIGATION)
         self.has_velocimeter = sensors.ground_velocity is not None
+        self.field = assembly.field if sensors.magnetic_field is not None else None
 
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors see, as views of the state rows where that is possible."""
@@ -50,6 +51,10 @@ class Columns:
         if self.has_velocimeter:
             to_body = attitude.conjugate(seen.attitude)
             seen = seen._replace(ground_velocity=attitude.rotate(to_body, seen.velocity))
+        if self.field is not None:
+            field = self.field.at(physics[..., 0])  # the row begins with the time
+            to_body = attitude.conjugate(seen.attitude)
+            seen = seen._replace(magnetic_field=attitude.rotate(to_body, field))
         return seen
 
     def motion(self, physics: Array) -> Measurement:
@@ -61,7 +66,7 @@ class Columns:
             physics[..., self.wheel_speed],
             physics[..., self.gimbal_angle],
             physics[..., self.gimbal_rate],
-            *[*[nothing] * 9, physics[..., self.wheel_angle]],
+            *[*[nothing] * 9, physics[..., self.wheel_angle], nothing],
         )
 
 

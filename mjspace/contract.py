@@ -49,6 +49,8 @@ class Measurement(NamedTuple):
     wheel_angle: Array = np.zeros(0)
     """Angles of the wheels with an electrical side, relative to what carries them [rad], shape
     (..., n)."""
+    magnetic_field: Array = np.zeros(0)
+    """Of the Earth, body axes [T], shape (..., 3)."""
 
 
 class Reference(NamedTuple):

@@ -108,6 +108,8 @@ def _blocks(
 ) -> list[Array]:
     """Return the terms' blocks; without ``hinges``, their (dof, place in qpos), of that size."""
     blocks = []
+    if environment.magnetic_field is not None:  # field and moment are written as it flies
+        blocks.append(_block(kernel.MAGNETIC, np.zeros(16)))
     if environment.orbit is not None:
         blocks.append(_block(kernel.ORBIT, kepler.pack(environment.orbit)))
     if environment.gravity is not None:

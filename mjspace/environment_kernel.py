@@ -19,13 +19,16 @@ from numba import cfunc, njit, types
 from numba.np.numpy_support import carray
 
 from mjspace import kepler
-from mjspace.environment_torques import body_torque, friction, inertial_torque, ripple
+from mjspace.environment_torques import body_torque, friction, inertial_torque, magnetic, ripple
 from mjspace.native_memory import floats, ints
 from mjspace.struct_offsets import DataOffsets, ModelOffsets
 
 MAGIC = 6.02214076e23
 HEADER = 4
 ORBIT, BODY_TORQUE, INERTIAL_TORQUE, FRICTION, RIPPLE, GRAVITY = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
+MAGNETIC = 7.0  # the first block where there is one, so that it is known where it stands:
+FIELD = slice(HEADER + 2, HEADER + 15)
+MOMENT = slice(HEADER + 15, HEADER + 18)
 
 _STAGE_VELOCITY = 2  # mjSTAGE_VEL: passive forces are known from it on
 
@@ -72,6 +75,8 @@ def add_forces(userdata: Any, time: float, vehicle: Vehicle) -> None:
             ripple(payload, vehicle)
         elif kind == GRAVITY:
             central(payload, vehicle)
+        elif kind == MAGNETIC:
+            magnetic(payload, time, vehicle)
         block = end
 
 

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from mjspace.fields import Angle, Angles3, Positive, Si, Table, Torque3
 from mjspace.landing_tables import CentralGravity
+from mjspace.magnetic_tables import MagneticField
 
 
 class Orbit(Table):
@@ -54,6 +55,7 @@ class Environment(Table):
 
     orbit: Orbit | None = None
     gravity: CentralGravity | None = None
+    magnetic_field: MagneticField | None = None
     torques: list[DisturbanceTorque] = []
     """Evaluated at every stage of the integrator."""
     python: str | None = None
@@ -64,4 +66,10 @@ class Environment(Table):
     def _one_planet(self) -> "Environment":
         if self.orbit is not None and self.gravity is not None:
             raise ValueError("orbit and gravity are both given: fly round the planet or land on it")
+        return self
+
+    @model_validator(mode="after")
+    def _around_the_earth(self) -> "Environment":
+        if self.magnetic_field is not None and (self.orbit is None or self.orbit.body != "earth"):
+            raise ValueError('magnetic_field: needs an orbit with body = "earth"')
         return self

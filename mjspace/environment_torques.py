@@ -46,6 +46,32 @@ def inertial_torque(series: Any, time: float, vehicle: Any) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def magnetic(payload: Any, time: float, vehicle: Any) -> None:
+    """Add moment x field [N m] on the bus, the moment being constant in body axes.
+
+    ``payload``: a cubic of time that is the field [T] in inertial axes, as one of
+    ``geomagnetism.FieldAlongOrbit.pieces``, and the moment (3) [A m^2].
+    """
+    since = time - payload[0]
+    x, y, z = field_of(payload, 0, since), field_of(payload, 1, since), field_of(payload, 2, since)
+    dof, moment = vehicle.bus_dof + 3, payload[13:16]
+    a, b, c = vehicle.cdof[dof], vehicle.cdof[dof + 1], vehicle.cdof[dof + 2]  # body axes
+    bx = a[0] * x + a[1] * y + a[2] * z
+    by = b[0] * x + b[1] * y + b[2] * z
+    bz = c[0] * x + c[1] * y + c[2] * z
+    vehicle.qfrc_passive[dof] += moment[1] * bz - moment[2] * by
+    vehicle.qfrc_passive[dof + 1] += moment[2] * bx - moment[0] * bz
+    vehicle.qfrc_passive[dof + 2] += moment[0] * by - moment[1] * bx
+
+
+@njit(cache=True, error_model="numpy")
+def field_of(piece: Any, axis: int, since: float) -> float:
+    """Return one component of the field's cubic."""
+    slope = (piece[1 + axis] * since + piece[4 + axis]) * since + piece[7 + axis]
+    return float(slope * since + piece[10 + axis])
+
+
+@njit(cache=True, error_model="numpy")
 def friction(pairs: Any, vehicle: Any) -> None:
     """Add -c tanh(speed / FRICTION_SPEED) [N m] to hinges, given as dof, c, dof, c..."""
     for i in range(0, pairs.size, 2):

@@ -130,6 +130,17 @@ class Scenario(Table):
         return self
 
     @model_validator(mode="after")
+    def _magnets_in_a_field(self) -> "Scenario":
+        magnets = {
+            "plant.magnetorquers": self.plant.magnetorquers,
+            "sensors.magnetic_field": self.sensors.magnetic_field,
+        }
+        for key, table in magnets.items():
+            if table is not None and self.environment.magnetic_field is None:
+                raise ValueError(f"{key}: needs an [environment.magnetic_field]")
+        return self
+
+    @model_validator(mode="after")
     def _whole_periods(self) -> "Scenario":
         step = self.rates.physics
         spans: dict[str, float | None] = {"rates.control": self.rates.control}

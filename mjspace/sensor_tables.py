@@ -79,7 +79,20 @@ class Accelerometer(SensorTiming):
     """Size of the least significant digit."""
 
 
-Errors = StarTracker | RateSensor | PlaceSensor | SpeedSensor | Accelerometer
+class Magnetometer(SensorTiming):
+    """Something that shows the magnetic field. Ideal by default."""
+
+    noise: Annotated[NonNegative, Si("T")] = 0.0
+    """Standard deviation of the white noise of each sample, on each axis."""
+    bias: Annotated[NonNegative, Si("T")] = 0.0
+    """Standard deviation of the constant bias drawn at the start, on each axis."""
+    bias_walk: Annotated[NonNegative, Si("T")] = 0.0
+    """Standard deviation that the bias's random walk has after one second."""
+    quantization: Annotated[NonNegative, Si("T")] = 0.0
+    """Size of the least significant digit."""
+
+
+Errors = StarTracker | RateSensor | PlaceSensor | SpeedSensor | Accelerometer | Magnetometer
 
 
 class Sensors(Table):
@@ -101,3 +114,5 @@ class Sensors(Table):
     """Velocimeter: the bus's velocity in body axes; none when left out."""
     specific_force: Accelerometer | None = None
     """Accelerometers at the bus's origin; none when left out."""
+    magnetic_field: Magnetometer | None = None
+    """Magnetometer, which the magnetorquers do not disturb; none when left out."""

@@ -16,6 +16,7 @@ from mjspace.strapdown import Strapdown
 from mjspace.tables import Rates
 
 NAVIGATION = ("position", "velocity", "altitude", "ground_velocity", "specific_force")
+OPTIONAL = (*NAVIGATION, "magnetic_field")
 """The fields of ``Measurement`` whose sensors a scenario may leave out."""
 
 State = dict[str, Array]
@@ -66,8 +67,8 @@ class SensorSuite:
             if table is not None
         ]
         self._sensors = [sensor for sensor in every if sensor is not None]
-        self._absent = [name for name in NAVIGATION if getattr(sensors, name) is None]
-        self._ideal = not self._sensors and len(self._absent) in (0, len(NAVIGATION))
+        self._absent = [name for name in OPTIONAL if getattr(sensors, name) is None]
+        self._ideal = not self._sensors and len(self._absent) in (0, len(OPTIONAL))
         self._strapdown = None
         if sensors.specific_force is not None:
             period = next(s.period for s in self._sensors if s.name == "specific_force")

@@ -16,6 +16,7 @@ from mjspace.assembly import Assembly
 from mjspace.columns import Columns
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.crossings import with_crossings
+from mjspace.environment_kernel import FIELD, MOMENT
 from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.start import Start, last_period
@@ -88,6 +89,9 @@ class _Flight:
         if start.model:
             self.batch.set_const()
         self.applied = [self._applied(kind) for kind in assembly.actuators.kinds]
+        self.field = assembly.field
+        if self.field is not None:
+            self.acting_field = self.batch.bind("userdata")[:, FIELD]
         self.sensordata = self.batch.bind("sensordata")
         self.actuators, self.actuator_state = assembly.actuators, start.actuators
         self.inner = getattr(assembly.law, "inner", None)
@@ -143,6 +147,8 @@ class _Flight:
         self.sensors, measurement = self.suite.sample(self.sensors, period * self.steps, truth)
         before, command, signals = self._ask_law(now, measurement, reference)
         given, saturated = self._drive(now, command, measurement, truth)
+        if self.field is not None:
+            self.acting_field[:] = self.field.piece(now)
         if self.push is not None:
             tape.push.append(self.push(now, truth))
         # Derived fields lag the state by one substep: the first substep computes those of `now`.
@@ -203,6 +209,8 @@ class _Flight:
         view: Array = self.batch.bind(kind.acts_on)
         if kind.acts_on == "qfrc_applied":
             return view[:, 3:6]  # the free joint comes first, its torque in body axes
+        if kind.acts_on == "userdata":
+            return view[:, MOMENT]
         motors = self.assembly.vehicle.motors
         others = sum(not is_thruster(name) for name in motors)
         of_kind = slice(others, None) if isinstance(kind, Thrusters) else slice(others)

@@ -26,6 +26,7 @@ from mjspace.fields import (
 )
 from mjspace.hinge_tables import Bearing, Hinge
 from mjspace.landing_tables import Engine, Ground
+from mjspace.magnetic_tables import Magnetorquers
 from mjspace.quantity import whole_number
 from mjspace.rcs_tables import Rcs
 
@@ -63,6 +64,9 @@ class Wheels(Bearing):
     """Largest motor torque; none when left out."""
     speed_limit: Annotated[Positive, Si("rad/s")] | None = None
     """Largest speed relative to the bus; at it the motor gives no torque that would raise it."""
+    allocation: Literal["least_squares", "least_peak"] = "least_squares"
+    """Of all motor torques that make the wanted one, those of least norm, or those whose largest is
+    least; the latter for one wheel more than the axes span, such as four in a pyramid."""
 
     @model_validator(mode="after")
     def _alike(self) -> "Wheels":
@@ -129,6 +133,9 @@ class PlantTable(Table):
     ideal_thrusters: bool = False
     """Whether a torque that the law asks for acts on the bus as if by thrusters, as it is: its
     command's ``torque`` or, beside motors or an engine, its ``thruster_torque``."""
+    magnetorquers: Magnetorquers | None = None
+    """None when left out; in an environment with a magnetic field they obey the command's
+    ``dipole``."""
     engine: Engine | None = None
     """What its engine on gimbals does, of a model that has one; no wheels then."""
     rcs: Rcs | None = None
@@ -180,7 +187,8 @@ class Initial(Table):
     velocity: Velocity3 = [0.0, 0.0, 0.0]
     """Of the bus, inertial axes."""
     wheel_speed: Annotated[list[Finite], Si("rad/s")] | None = None
-    """Wheel speeds relative to the bus; zero when left out."""
+    """Wheel speeds relative to what carries them; zero when left out. Bias speeds whose momenta
+    cancel, as [b, -b, b, -b] in a pyramid, keep the wheels away from zero."""
     joint_position: dict[Name, Finite] = {}
     """Positions of the parts' joints, by name [rad or m]; the model's own when left out."""
     joint_speed: dict[Name, Finite] = {}

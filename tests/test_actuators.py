@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import linprog
 
 from mjspace.actuators import ReactionWheels
 
@@ -15,6 +16,8 @@ PYRAMID = [[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]]
 SKEW = [[1, 0.2, 0], [0, 1, 0.3], [0.1, 0, 1]]
 LAYOUTS = {"orthogonal": np.eye(3).tolist(), "skew": SKEW, "pyramid": PYRAMID}
 layouts = pytest.mark.parametrize("axes", LAYOUTS.values(), ids=LAYOUTS.keys())
+UNEVEN = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 2, 3]]
+PLANAR = [[1, 0, 0], [-1, 2, 0], [-1, -2, 0], [0, 0, 1]]
 components = st.integers(-(10**9), 10**9).map(lambda micro: 1e-6 * micro)  # none subnormal
 
 
@@ -56,6 +59,55 @@ def test_of_all_torques_that_would_do_it_takes_the_least(torque: Any, spare: flo
     scale = 1e-14 * (np.linalg.norm(torque) + abs(spare))  # rounding
     assert np.linalg.norm(ctrl) <= np.linalg.norm(ctrl + spare * idle) + scale
     assert abs(ctrl @ idle) <= 1e-14 * np.linalg.norm(torque)
+
+
+def least_peak(team: ReactionWheels, torque: Any) -> float:
+    """Return the least that the largest motor torque [N m] can be, by linear programming."""
+    count = len(team.axes)
+    bounds = np.block(
+        [[np.eye(count), -np.ones((count, 1))], [-np.eye(count), -np.ones((count, 1))]]
+    )
+    solved = linprog(
+        np.eye(count + 1)[-1], A_ub=bounds, b_ub=np.zeros(2 * count),
+        A_eq=np.hstack([-team.axes.T, np.zeros((3, 1))]), b_eq=torque, bounds=(None, None),
+    )  # fmt: skip
+    assert solved.status == 0
+    return float(solved.fun)
+
+
+@pytest.mark.parametrize("layout", [PYRAMID, UNEVEN, PLANAR], ids=["pyramid", "uneven", "planar"])
+def test_the_least_peak_is_the_linear_programs(layout: Any) -> None:
+    team = wheels(layout, shared_by="least_peak")
+    least_squares = wheels(layout)
+    for torque in np.random.default_rng(1).normal(size=(50, 3)):
+        ctrl, _ = team.motor_torque(torque, np.zeros(4))
+        assert np.abs(-ctrl @ team.axes - torque).max() < 1e-14 * np.abs(torque).max() * 10.0
+        peak = np.abs(ctrl).max()
+        assert peak == pytest.approx(least_peak(team, torque), rel=1e-9)  # the solver's tolerance
+        norm = least_squares.motor_torque(torque, np.zeros(4))[0]
+        assert peak <= np.abs(norm).max() * (1.0 + 1e-15)
+
+
+def test_along_a_wheel_of_a_pyramid_the_peak_is_two_thirds() -> None:
+    torque = np.ones(3) / sqrt(3.0)
+    by_norm, _ = wheels(PYRAMID).motor_torque(torque, np.zeros(4))
+    by_peak, _ = wheels(PYRAMID, shared_by="least_peak").motor_torque(torque, np.zeros(4))
+    np.testing.assert_allclose(by_norm, [-0.75, -0.25, 0.25, -0.25], atol=1e-15)
+    np.testing.assert_allclose(by_peak, [-0.5, -0.5, 0.5, -0.5], atol=1e-15)
+
+
+def test_a_wheel_that_can_lend_nothing_leaves_the_others_where_their_norm_is_least() -> None:
+    # The planar three share x and y; z is the fourth's alone, and its torque is the peak.
+    torque = np.array([0.1, 0.2, 5.0])
+    by_norm, _ = wheels(PLANAR).motor_torque(torque, np.zeros(4))
+    by_peak, _ = wheels(PLANAR, shared_by="least_peak").motor_torque(torque, np.zeros(4))
+    np.testing.assert_array_equal(by_peak, by_norm)
+
+
+@pytest.mark.parametrize("axes", [SKEW, [*PYRAMID, [0, 0, 1]]], ids=["three", "five"])
+def test_least_peak_is_refused_where_there_is_no_one_number_to_choose(axes: Any) -> None:
+    with pytest.raises(ValueError, match="one wheel more than their axes span"):
+        wheels(axes, shared_by="least_peak")
 
 
 def test_a_torque_along_no_wheel_is_given_as_nearly_as_can_be() -> None:
@@ -116,10 +168,13 @@ def test_not_a_number_is_passed_on_and_flagged() -> None:
     assert saturated[0] == 1.0
 
 
-@layouts
-def test_a_vehicle_gets_the_same_bits_alone_and_in_a_batch(axes: Any) -> None:
+@pytest.mark.parametrize(
+    ("axes", "shared_by"),
+    [*((axes, "least_squares") for axes in LAYOUTS.values()), (UNEVEN, "least_peak")],
+)
+def test_a_vehicle_gets_the_same_bits_alone_and_in_a_batch(axes: Any, shared_by: Any) -> None:
     rng = np.random.default_rng(0)
-    team = wheels(axes, torque_limit=0.8, speed_limit=1.0)
+    team = wheels(axes, torque_limit=0.8, speed_limit=1.0, shared_by=shared_by)
     torque, speed = rng.normal(size=(129, 3)), rng.normal(size=(129, len(axes)))
     ctrl, saturated = team.motor_torque(torque, speed)
     assert 0 < saturated.sum() < saturated.size

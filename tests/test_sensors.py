@@ -35,7 +35,7 @@ def still(vehicles: int = 1, wheels: int = 3) -> Measurement:
         np.tile([1.0, 0.0, 0.0, 0.0], (vehicles, 1)),
         np.zeros((vehicles, 3)),
         np.zeros((vehicles, wheels)),
-        *[np.zeros((vehicles, 0))] * 11,
+        *[np.zeros((vehicles, 0))] * 13,
     )
 
 
@@ -46,7 +46,7 @@ def moving(step: int, members: Any = (0,)) -> Measurement:
         from_rotation_vector(0.01 * step * axis),
         np.cos(0.1 * step) * axis,
         3.0 * axis + step,
-        *[axis[:, :0]] * 11,
+        *[axis[:, :0]] * 13,
     )
 
 
