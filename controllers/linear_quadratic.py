@@ -106,7 +106,7 @@ def cost_to_go(
 
     found = solve_ivp(
         slope, (time[-1], time[0]), final.ravel(), method="DOP853", t_eval=time[::-1],
-        rtol=1e-11, atol=1e-12,
+        rtol=1e-9, atol=1e-10,
     )  # fmt: skip
     P: Array = found.y.T[::-1].reshape(-1, 6, 6)
     return P

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from mjspace.controllers.contraction import Adaptive, Gradient, Ideal, IdealState
 from mjspace.controllers.immersion_invariance import ImmersionInvariance
+from mjspace.controllers.linear_quadratic import Regulator
+from mjspace.controllers.quaternion_feedback import RateDamping, Switched
 from mjspace.controllers.references import Hold, MultiAxis
 from oracle import fly, wheel_speeds
 
@@ -23,6 +25,9 @@ LAWS = [
     Gradient(PERIOD),
     Adaptive(PERIOD, adaptation_gain=3.0),
     ImmersionInvariance(H, AXES, JW),
+    Regulator(H, AXES, JW),
+    Switched(PERIOD, AXES, JW),
+    RateDamping(PERIOD, AXES, JW),
 ]
 laws = pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
 
@@ -145,6 +150,7 @@ def turned(law: Any, start: np.ndarray, duration: float) -> float:
         Gradient(PERIOD),
         Adaptive(PERIOD),
         ImmersionInvariance(H, np.eye(3), np.full(3, 0.05)),
+        Regulator(H, np.eye(3), np.full(3, 0.05), np.full(3, 0.1), torque_weight=np.full(3, 1e-6)),
     ],
     ids=lambda law: type(law).__name__,
 )
