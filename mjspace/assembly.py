@@ -15,6 +15,7 @@ from mjspace.components import construct, load_object, source_of
 from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.engine import GimballedEngine
 from mjspace.errors import blamed_on
+from mjspace.faults import FaultSet
 from mjspace.geomagnetism import FieldAlongOrbit, along
 from mjspace.magnetorquers import CoilSet
 from mjspace.motor_drives import MotorDrives
@@ -62,6 +63,25 @@ class Assembly:
         )
 
     def _gravity(self, position: Array) -> Array:
+    @property
+    def driven_stepwise(self) -> bool:
+        """Whether the actuators act in every integration step; else once in a control period."""
+        return hasattr(self.law, "inner") or self.actuators.stateful
+
+    @property
+    def hold(self) -> float:
+        """For how long what the actuators give is held [s]."""
+        rates = self.scenario.rates
+        return rates.physics if self.driven_stepwise else rates.control
+
+    def faults(self, members: Sequence[int]) -> FaultSet | None:
+        """Return the faults of these members of the campaign; None where nothing goes wrong."""
+        scenario = self.scenario
+        if not scenario.faults:
+            return None
+        kinds, motors = self.actuators.kinds, self.vehicle.motors
+        return FaultSet(scenario.faults, kinds, motors, self.hold, scenario.seed, members)
+
         """Return the central gravity [m/s^2] at ``position`` [m], both (..., 3)."""
         table = self.scenario.environment.gravity
         if table is None:
@@ -127,6 +147,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
     _part("sensors", assembly.sensors, [0])
     return assembly
 
+    _part("faults", assembly.faults, [0])
 
 def _component(
     role: str, component: Component, facts: dict[str, Any], folder: Path

@@ -2,14 +2,13 @@
 
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from mjspace.contract import Array
 from mjspace.environment_tables import Environment
+from mjspace.fault_tables import Fault
 from mjspace.fields import Seconds, Table, Time
-from mjspace.quantity import any_to_si, whole_number
+from mjspace.quantity import whole_number
+from mjspace.regions import Region
 from mjspace.sensor_tables import Sensors
 from mjspace.tables import Initial, PlantTable, Rates
 
@@ -28,38 +27,14 @@ class Component(BaseModel):
         return dict(self.model_extra or {})
 
 
-class Region(Table):
+class Watched(Region):
     """Where a logged signal is wanted, or watched."""
 
     name: str
     """What it says in the table of checks, or in the log."""
-    signal: str
-    """``topic.field`` or ``topic.field[i]`` of the log: ``truth.attitude_error``; of a vector its
-    norm."""
-    below: float | None = None
-    """It must be less; a number in SI or a quantity."""
-    above: float | None = None
-    """It must be greater; a number in SI or a quantity."""
-
-    @field_validator("below", "above", mode="before")
-    @classmethod
-    def _quantity(cls, value: Any) -> Any:
-        return any_to_si(value) if isinstance(value, str) else value
-
-    @model_validator(mode="after")
-    def _bounded(self) -> Self:
-        if self.below is None and self.above is None:
-            raise ValueError("neither below nor above is given: a region must have an outside")
-        return self
-
-    def admits(self, value: Array | float) -> NDArray[np.bool_]:
-        """Return whether each value is inside; what is no number never is."""
-        below = True if self.below is None else np.less(value, self.below)
-        above = True if self.above is None else np.greater(value, self.above)
-        return np.logical_and(below, above)
 
 
-class Event(Region):
+class Event(Watched):
     """What the log is to mention: each time the signal comes into the region, with its value."""
 
     level: Literal["INFO", "WARNING"] = "INFO"
@@ -68,7 +43,7 @@ class Event(Region):
     """Other signals whose values the line gives as well."""
 
 
-class Check(Region):
+class Check(Watched):
     """One thing that the flight must show, judged from the log alone."""
 
     statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
@@ -114,6 +89,7 @@ class Scenario(Table):
     sensors: Sensors = Sensors()
     reference: Component
     law: Component
+    faults: list[Fault] = []
     checks: list[Check] = []
     verdict: Literal["PASS", "FAIL"] = "PASS"
     """What is right: a scenario may be there to show a failure."""

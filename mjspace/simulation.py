@@ -94,16 +94,16 @@ class _Flight:
             self.acting_field = self.batch.bind("userdata")[:, FIELD]
         self.sensordata = self.batch.bind("sensordata")
         self.actuators, self.actuator_state = assembly.actuators, start.actuators
+        self.faults = assembly.faults(members)
         self.inner = getattr(assembly.law, "inner", None)
         self.push = None
         if assembly.disturbance is not None:
             bus = assembly.vehicle.model.body("bus").id
             applied = self.batch.bind("xfrc_applied")[:, bus]
             self.push = HeldDisturbance(assembly.disturbance, applied)
-        self.driven_stepwise = self.inner is not None or self.actuators.stateful
+        self.hold = assembly.hold
+        self.driven_stepwise = assembly.driven_stepwise
         self.stepwise = self.driven_stepwise or self.push is not None
-        rates = scenario.rates
-        self.hold = rates.physics if self.driven_stepwise else rates.control
         self.steps = scenario.rates.steps
         self.tick = math.gcd(self.steps, *self.suite.ticks)
         recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
@@ -146,6 +146,12 @@ class _Flight:
         tape.actuators.append(self.actuator_state)
         self.sensors, measurement = self.suite.sample(self.sensors, period * self.steps, truth)
         before, command, signals = self._ask_law(now, measurement, reference)
+        if self.faults is not None:
+            topics = {"truth": truth, "measurement": measurement, "command": command}
+            self.actuator_state, happened = self.faults.decide(
+                self.actuator_state, now, topics | {"law": signals}
+            )
+            tape.happened += happened
         given, saturated = self._drive(now, command, measurement, truth)
         if self.field is not None:
             self.acting_field[:] = self.field.piece(now)
@@ -194,6 +200,8 @@ class _Flight:
         self.actuator_state, given, saturated = self.actuators.act(
             self.actuator_state, command, truth, self.hold
         )
+        if self.faults is not None:
+            self.actuator_state, given = self.faults.change(self.actuator_state, given, now)
         for view, torque in zip(self.applied, given, strict=True):
             view[:] = torque
         return given, saturated

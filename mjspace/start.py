@@ -48,5 +48,7 @@ def first_start(assembly: Assembly, members: Sequence[int]) -> Start:
     mujoco.mj_getState(model, data, row, INTEGRATION)
     physics = np.repeat(row[None], len(members), axis=0)
     actuators = assembly.actuators.reset(len(members))
+    if (faults := assembly.faults(members)) is not None:
+        actuators |= faults.reset()
     truth = assembly.actuators.seen(actuators, Columns(assembly).truth(physics))
     return Start(0, physics, assembly.sensors(members).reset(truth), None, actuators)

@@ -81,6 +81,7 @@ class Tape:
     signals: list[Any] = field(default_factory=list)
     push: list[Array] = field(default_factory=list)
     sensordata: list[Array] = field(default_factory=list)
+    happened: list[Happening] = field(default_factory=list)
 
     def __len__(self) -> int:
         """Return the number of whole periods: the sensor data is recorded last."""
@@ -135,6 +136,7 @@ class Tape:
         events = _saturation_events(
             time, np.array(self.saturated[:n], bool), saturated_before, vehicle.motors
         )
+        events += [event for event in self.happened if event[0] <= time[-1]]
         return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
 
 

@@ -1,0 +1,169 @@
+"""Faults of actuators: what they give is changed on its way to the vehicle, from a moment on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mjspace.actuators import Actuators, State
+from mjspace.addresses import is_thruster
+from mjspace.checks import find_signal, magnitude
+from mjspace.components import nearest
+from mjspace.contract import Array
+from mjspace.errors import blamed_on
+from mjspace.fault_tables import Fault
+from mjspace.noise import normals
+from mjspace.quantity import whole_number
+from mjspace.thrusters import Thrusters
+
+STREAM = 1000
+"""First number of the faults' random streams; the sensors' are the fields of ``Measurement``."""
+TICK = 1e-9  # s
+_WAITING, _IN_FORCE, _OVER = 0.0, 1.0, 2.0
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a fault's motors are in what the kinds of actuators give."""
+
+    kind: int
+    columns: list[int]
+
+
+class FaultSet:
+    """The faults of a batch of vehicles; all memory is in ``State``.
+
+    A fault begins and ends with a control period. Of several on one motor, each changes what those
+    listed before have left.
+    """
+
+    def __init__(
+        self,
+        tables: Sequence[Fault],
+        kinds: Sequence[Actuators],
+        motors: Sequence[str],
+        hold: float,
+        seed: int,
+        members: Sequence[int],
+    ) -> None:
+        """Find the motors; ``hold`` [s] is how long what actuators give is held.
+
+        Raises:
+            ValueError: no such motor, or a delay that is no whole number of holds.
+        """
+        self._tables, self._hold, self._vehicles = tables, hold, len(members)
+        known = _places(kinds, motors)
+        self._places, self._delays, self._noises = [], [], []
+        for number, fault in enumerate(tables):
+            if fault.motor not in known:
+                raise ValueError(
+                    f"faults.{number}.motor: none is called {fault.motor!r}"
+                    f"{nearest(fault.motor, known)}"
+                )
+            place, delay = known[fault.motor], 0
+            if fault.kind == "delayed" and fault.value:
+                key = f"faults.{number}.value"
+                delay = whole_number(fault.value, hold, key, "what is held by actuators")
+            self._places.append(place)
+            self._delays.append(delay)
+            width = len(place.columns)
+            self._noises.append(normals(seed, members, (STREAM + number,), width))
+
+    def reset(self) -> State:
+        """Return the state at the start.
+
+        Its fields: "fault_phase" (N, faults), 0 before each, 1 while it lasts and 2 after it; and
+        "fault_<number>_past" (N, motors, k), what the motors of a delayed or stuck one would have
+        given, the newest last.
+        """
+        state = {"fault_phase": np.full((self._vehicles, len(self._tables)), _WAITING)}
+        for number, fault in enumerate(self._tables):
+            length = {"delayed": self._delays[number], "stuck": 1}.get(fault.kind, 0)
+            if length:
+                width = len(self._places[number].columns)
+                state[f"fault_{number}_past"] = np.zeros((self._vehicles, width, length))
+        return state
+
+    def decide(
+        self, state: State, now: float, seen: Mapping[str, Any]
+    ) -> tuple[State, list[tuple[float, int, str, str]]]:
+        """Return the state with what begins and ends at ``now`` [s], and the events of that.
+
+        ``seen`` has the named tuples that a fault's ``when`` may look at, by topic.
+
+        Raises:
+            InputError: a fault looks at a signal that is not there, with the near names.
+        """
+        phase = state["fault_phase"].copy()
+        happened = []
+        for number, fault in enumerate(self._tables):
+            over = fault.until is not None and now >= fault.until - TICK
+            ends = over & (phase[:, number] == _IN_FORCE)
+            begins = ~np.bool_(over) & (phase[:, number] == _WAITING)
+            begins &= self._is_due(number, now, seen)
+            phase[ends, number], phase[begins, number] = _OVER, _IN_FORCE
+            what = f"fault: {fault.motor} is {fault.kind}"
+            happened += [(now, int(v), "WARNING", what) for v in np.flatnonzero(begins)]
+            happened += [(now, int(v), "INFO", f"{what} no more") for v in np.flatnonzero(ends)]
+        return state | {"fault_phase": phase}, happened
+
+    def change(
+        self, state: State, given: tuple[Array, ...], now: float
+    ) -> tuple[State, tuple[Array, ...]]:
+        """Return (state, what the motors give instead of ``given``) from ``now`` [s] on."""
+        state, result = state.copy(), list(given)
+        for number, (fault, place) in enumerate(zip(self._tables, self._places, strict=True)):
+            right = result[place.kind][:, place.columns]
+            field = f"fault_{number}_past"
+            past = state.get(field)
+            index = round(now / self._hold)
+            wrong = self._wrong(number, right, past, index)
+            in_force = state["fault_phase"][:, number] == _IN_FORCE
+            if past is not None:
+                newest = np.concatenate([past[..., 1:], right[..., None]], axis=-1)
+                keeps = in_force & (fault.kind == "stuck")
+                state[field] = np.where(keeps[:, None, None], past, newest)
+            changed = result[place.kind].copy()
+            changed[:, place.columns] = np.where(in_force[:, None], wrong, right)
+            result[place.kind] = changed
+        return state, tuple(result)
+
+    def _wrong(self, number: int, right: Array, past: Array | None, index: int) -> Array:
+        """Return what the fault's motors give where it is in force, (N, motors)."""
+        kind, value = self._tables[number].kind, self._tables[number].value or 0.0
+        if past is not None:
+            return past[..., 0]
+        if kind == "noisy":
+            return right + value * self._noises[number](index)
+        return right + value if kind == "biased" else right * value  # of a dead one by zero
+
+    def _is_due(self, number: int, now: float, seen: Mapping[str, Any]) -> Any:
+        fault = self._tables[number]
+        if fault.when is None:
+            return now >= (fault.at or 0.0) - TICK
+        arrays = {
+            f"/{topic}": {n: np.asarray(a) for n, a in values._asdict().items() if np.size(a)}
+            for topic, values in seen.items()
+            if values
+        }
+        topics = {t: {n: a.shape[1:] for n, a in fields.items()} for t, fields in arrays.items()}
+        with blamed_on(f"faults.{number}.when.signal"):
+            topic, field, part = find_signal(topics, fault.when.signal)
+        rows = arrays[topic][field].reshape(self._vehicles, -1)
+        return fault.when.admits(magnitude(rows[:, part]))
+
+
+def _places(kinds: Sequence[Actuators], motors: Sequence[str]) -> dict[str, _Place]:
+    """Return the motors by each name that they have."""
+    pushing = [name for name in motors if is_thruster(name)]
+    turning = [name for name in motors if not is_thruster(name)]
+    known = {}
+    for number, kind in enumerate(kinds):
+        names = pushing if isinstance(kind, Thrusters) else turning
+        if kind.acts_on != "ctrl":
+            names = [""] * 3  # of a torque or moment on the bus: its axes
+        for column, name in enumerate(names):
+            known[name] = known[f"{kind.logged_as}[{column}]"] = _Place(number, [column])
+        known[kind.logged_as] = _Place(number, list(range(len(names))))
+    return {name: place for name, place in known.items() if name}

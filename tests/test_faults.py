@@ -1,0 +1,156 @@
+"""Faults of actuators: each kind against its definition, replay, a batch, and what is refused."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mjspace.actuators import ReactionWheels
+from mjspace.assembly import assemble
+from mjspace.contract import Array
+from mjspace.errors import InputError
+from mjspace.fault_tables import Fault
+from mjspace.faults import FaultSet
+from mjspace.flight import run
+from mjspace.loading import load
+from mjspace.replay import verify
+from mjspace.simulation import fly
+from mjspace.start import first_start
+
+HOLD = 0.1  # s
+MOTORS = ("wheel_0", "wheel_1", "wheel_2")
+RIGHT = np.sin(np.arange(12.0)[:, None] + [0.0, 1.0, 2.0])  # N m, of three wheels, each period
+
+
+def given(members: int = 1, **table: Any) -> tuple[Array, list[Any]]:
+    """Return what wheels that should give ``RIGHT`` do give, (periods, N, 3), and the events."""
+    wheels = [ReactionWheels(np.eye(3))]
+    faults = FaultSet(
+        [Fault.model_validate({"motor": "wheel_1", **table})],
+        wheels,
+        MOTORS,
+        HOLD,
+        seed=3,
+        members=range(members),
+    )
+    state, rows, events = faults.reset(), [], []
+    for k, right in enumerate(RIGHT):
+        state, happened = faults.decide(state, k * HOLD, {})
+        state, (row,) = faults.change(state, (np.tile(right, (members, 1)),), k * HOLD)
+        rows.append(row)
+        events += happened
+    return np.array(rows), events
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "wanted"),
+    [
+        ("dead", None, lambda right: 0.0 * right),
+        ("stuck", None, lambda right: np.full_like(right, RIGHT[3, 1])),
+        ("biased", "20 mN m", lambda right: right + 0.02),
+        ("scaled", -0.5, lambda right: -0.5 * right),
+        ("delayed", "200 ms", lambda right: RIGHT[2:6, 1]),
+    ],
+)
+def test_a_motor_gives_what_its_fault_says(kind: str, value: Any, wanted: Any) -> None:
+    # From the first period not before 0.35 s to the last before 0.8 s.
+    rows, events = given(kind=kind, value=value, at="350 ms", until="800 ms")
+    expected = RIGHT.copy()
+    expected[4:8, 1] = wanted(RIGHT[4:8, 1])
+    np.testing.assert_array_equal(rows[:, 0], expected)
+    assert events == [
+        (0.4, 0, "WARNING", f"fault: wheel_1 is {kind}"),
+        (0.8, 0, "INFO", f"fault: wheel_1 is {kind} no more"),
+    ]
+
+
+def test_noise_is_of_that_size_and_a_members_own() -> None:
+    rows, _ = given(400, kind="noisy", value=0.1, at=0.0)
+    noise = rows[:, :, 1] - RIGHT[:, None, 1]
+    # 4800 numbers: their deviation is known to 1 %, their mean to 0.0014.
+    assert np.std(noise) == pytest.approx(0.1, rel=0.04)
+    assert abs(np.mean(noise)) < 0.006
+    assert abs(np.mean(noise[1:] * noise[:-1])) < 6e-4  # white
+    np.testing.assert_array_equal(given(1, kind="noisy", value=0.1, at=0.0)[0][:, 0], rows[:, 0])
+
+
+def test_several_faults_act_one_after_the_other_on_any_kind_of_actuator() -> None:
+    thrusters: Any = SimpleNamespace(acts_on="qfrc_applied", logged_as="thruster_torque")
+    tables = [
+        Fault(motor="wheel_torque", kind="scaled", value=0.5, at=0.0),
+        Fault(motor="wheel_torque[2]", kind="biased", value=1.0, at=0.0),
+        Fault(motor="thruster_torque[0]", kind="dead", at=0.0),
+    ]
+    faults = FaultSet(tables, [ReactionWheels(np.eye(3)), thrusters], MOTORS, HOLD, 0, [0])
+    state, _ = faults.decide(faults.reset(), 0.0, {})
+    one = np.ones((1, 3))
+    _, (wheels, torque) = faults.change(state, (one, one), 0.0)
+    assert wheels.tolist() == [[0.5, 0.5, 1.5]]
+    assert torque.tolist() == [[0.0, 1.0, 1.0]]
+    assert one.tolist() == [[1.0, 1.0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("{motor='wheel_7',kind='dead',at=0}", r"faults.0.motor: none is called 'wheel_7': did"),
+        ("{motor='wheel_0',kind='biased',at=0}", "value: a motor that is biased has one: give it"),
+        ("{motor='wheel_0',kind='dead',value=1,at=0}", "a motor that is dead has none"),
+        ("{motor='wheel_0',kind='dead'}", "at and when: give one of them"),
+        ("{motor='wheel_0',kind='dead',at=3,until=2}", "until 2 s is not after at 3 s"),
+        ("{motor='wheel_0',kind='noisy',value=-1,at=0}", "more than 0"),
+        ("{motor='wheel_0',kind='delayed',value='7 ms',at=0}", "faults.0.value 0.007 s is no whol"),
+    ],
+)
+def test_a_fault_that_cannot_be_is_refused_in_one_line(table: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as refused:
+        assemble(*load("detumble-wheels", [f"faults=[{table}]"]))
+    assert "\n" not in str(refused.value)
+
+
+def test_an_unknown_signal_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    fault = "{motor='wheel_0',kind='dead',when={signal='truth.ratte',below=1}}"
+    with pytest.raises(InputError, match=r"faults.0.when.signal: no signal 'truth.ratte' .* did"):
+        run("detumble-wheels", overrides=[f"faults=[{fault}]"], out=tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+
+
+MANY = [
+    "duration=2",
+    "checks=[]",
+    "faults=[{motor='wheel_0',kind='stuck',when={signal='truth.rate',below=0.36}},"
+    "{motor='wheel_1',kind='noisy',value=0.1,at=0.2},"
+    "{motor='wheel_2',kind='delayed',value='50 ms',at=1.0,until=1.5}]",
+]
+
+
+def test_a_faulty_flight_is_replayed_bit_for_bit_from_anywhere(tmp_path: Path) -> None:
+    flown = run("detumble-wheels", overrides=MANY, out=tmp_path)
+    for start in (0.0, 0.7, 1.2, 1.9):
+        assert verify(flown.path, start=start) is None
+    truth, command = flown.log.read("/truth"), flown.log.read("/command")
+    told = [event.message for event in flown.log.events()]
+    assert [line for line in told if line.startswith("fault")] == [
+        "fault: wheel_1 is noisy",
+        "fault: wheel_0 is stuck",
+        "fault: wheel_2 is delayed",
+        "fault: wheel_2 is delayed no more",
+    ]
+    slow = np.linalg.norm(truth["rate"], axis=1) < 0.36
+    assert 0.1 < np.mean(slow) < 0.9
+    held = command["wheel_torque"][slow, 0]
+    np.testing.assert_array_equal(held, command["wheel_torque"][np.argmax(slow) - 1, 0])
+
+
+def test_a_faulty_batch_is_as_one_each() -> None:
+    built = assemble(*load("detumble-wheels", [*MANY, "duration=1"]))
+    batch = list(fly(built, first_start(built, range(3)), range(3)))
+    for member in range(3):
+        alone = list(fly(built, first_start(built, [member]), [member]))
+        for one, many in zip(alone, batch, strict=True):
+            for field, rows in one.rows["/state"].items():
+                np.testing.assert_array_equal(many.rows["/state"][field][:, member], rows[:, 0])
+    noisy = batch[-1].rows["/state"]["physics"]
+    assert (noisy[-1, 0] != noisy[-1, 1]).any()
