@@ -7,6 +7,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjspace import guards
+
 ENGINE = ("engine_outer", "engine_inner", "engine_thrust")
 """The motors of an engine on gimbals, in the order of ``ctrl``."""
 
@@ -48,15 +50,33 @@ def of(model: Any, wheels: int, driven: Collection[str], *, engine: bool = False
 
 def _by_motor(model: Any, driven: Collection[str]) -> list[str]:
     """Return the ``driven`` hinges in the order of their motors in ``ctrl``."""
-    on_joints = np.flatnonzero(model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
-    turned = [model.joint(model.actuator_trnid[i, 0]).name for i in on_joints]
-    parts = [name for name in turned if not re.fullmatch(r"wheel_\d+", name)]
+    parts = turned(model)
     for name in driven:
         if name not in parts:
             raise ValueError(f"plant.drives.{name}: no motor turns it: have {', '.join(parts)}")
     if left := set(parts).difference(driven) if driven else ():
         raise ValueError(f"plant.drives: {', '.join(sorted(left))} has a motor and no drive")
     return parts if driven else []
+
+
+def turned(model: Any) -> list[str]:
+    """Return the parts' joints that motors turn, in the order of ``ctrl``."""
+    on_joints = np.flatnonzero(model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
+    names = [model.joint(model.actuator_trnid[i, 0]).name for i in on_joints]
+    return [name for name in names if not re.fullmatch(r"wheel_\d+", name)]
+
+
+def axes(model: Any, dofs: Any) -> Any:
+    """Return the hinges' unit axes with all joints at rest, body axes, shape (n, 3)."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    bus = data.xmat[model.body("bus").id].reshape(3, 3)
+    return data.xaxis[model.dof_jntid[dofs]] @ bus
+
+
+def axial_inertia(model: Any, dofs: Any) -> Any:
+    """Return the inertia [kg m^2] of all that each hinge turns, about its axis, shape (n,)."""
+    return guards.mass_matrix(model)[dofs, dofs]
 
 
 def _engine(model: Any) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace import central_gravity, environment, plant
+from mjspace import addresses, central_gravity, environment, plant
 from mjspace.actuators import Actuators, IdealThrusters, ReactionWheels
 from mjspace.combined_actuators import Together
 from mjspace.components import construct, load_object, source_of
@@ -17,6 +17,7 @@ from mjspace.engine import GimballedEngine
 from mjspace.errors import blamed_on
 from mjspace.faults import FaultSet
 from mjspace.geomagnetism import FieldAlongOrbit, along
+from mjspace.gimbal_servos import GimbalServos
 from mjspace.magnetorquers import CoilSet
 from mjspace.motor_drives import MotorDrives
 from mjspace.one_by_one import OneByOne
@@ -62,7 +63,6 @@ class Assembly:
             gravity=self._gravity,
         )
 
-    def _gravity(self, position: Array) -> Array:
     @property
     def driven_stepwise(self) -> bool:
         """Whether the actuators act in every integration step; else once in a control period."""
@@ -82,6 +82,7 @@ class Assembly:
         kinds, motors = self.actuators.kinds, self.vehicle.motors
         return FaultSet(scenario.faults, kinds, motors, self.hold, scenario.seed, members)
 
+    def _gravity(self, position: Array) -> Array:
         """Return the central gravity [m/s^2] at ``position`` [m], both (..., 3)."""
         table = self.scenario.environment.gravity
         if table is None:
@@ -108,6 +109,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         "control_period": scenario.rates.control,
         "inner_period": scenario.rates.physics,
         **_of_thrusters(scenario.plant),
+        **_of_gimbals(scenario.plant, vehicle),
     }
     flown: dict[str, Any] = {}
     sources = {}
@@ -145,9 +147,9 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         sources=sources,
     )
     _part("sensors", assembly.sensors, [0])
+    _part("faults", assembly.faults, [0])
     return assembly
 
-    _part("faults", assembly.faults, [0])
 
 def _component(
     role: str, component: Component, facts: dict[str, Any], folder: Path
@@ -171,6 +173,8 @@ def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
     if table.drives:
         driven = [table.drives[name] for name in vehicle.motors if name in table.drives]
         kinds.append(MotorDrives.of(vehicle, driven))
+    if table.servos is not None:
+        kinds.append(GimbalServos.of(vehicle, table.servos))
     if table.engine is not None:
         kinds.append(GimballedEngine.of(vehicle, table.engine))
     others = table.ideal_thrusters or table.rcs or table.magnetorquers
@@ -198,6 +202,17 @@ def _of_thrusters(table: PlantTable) -> dict[str, Any]:
         "thruster_directions": np.array(rcs.unit_directions),
         "thruster_force": np.full(len(rcs.positions), rcs.thrust),
         "thruster_minimum_on": rcs.minimum_on,
+    }
+
+
+def _of_gimbals(table: PlantTable, vehicle: Vehicle) -> dict[str, Any]:
+    """Return what a law may want to know of gimbals with speed loops, and the wheels in them."""
+    if table.servos is None:
+        return {}
+    return {
+        "gimbal_axes": addresses.axes(vehicle.model, vehicle.gimbal_dof),
+        "spin_axes": addresses.axes(vehicle.model, vehicle.wheel_dof),
+        "wheel_inertia": addresses.axial_inertia(vehicle.model, vehicle.wheel_dof),
     }
 
 

@@ -100,6 +100,13 @@ class VoltageCommand(NamedTuple):
     two windings', where the drive works in those."""
 
 
+class GimbalRateCommand(NamedTuple):
+    """What a law asks of gimbals that have speed loops of their own."""
+
+    gimbal_rate: Array
+    """Relative to what carries each [rad/s], shape (..., g)."""
+
+
 class ThrustCommand(NamedTuple):
     """What a law asks of an engine on two gimbals."""
 
@@ -123,9 +130,9 @@ class Law(Protocol):
     those of the measurement; they are logged under their field names, so their shapes never change
     during a flight. A law that says ``batched = True`` handles any leading axes; another sees the
     arrays of one vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any
-    command with that field; motors with an electrical side a ``VoltageCommand``; an engine on
-    gimbals a ``ThrustCommand``, on/off thrusters a ``PulseCommand``. ``reference`` is what the
-    scenario's reference says: ``Wanted``.
+    command with that field; motors with an electrical side a ``VoltageCommand``; gimbals with speed
+    loops a ``GimbalRateCommand``; an engine on gimbals a ``ThrustCommand``, on/off thrusters a
+    ``PulseCommand``. ``reference`` is what the scenario's reference says: ``Wanted``.
 
     A batched law may have an inner loop as well, for what must be quick: a method
     ``inner(state, time, command, measurement) -> (state, command)``, pure like ``step``, that is
@@ -156,7 +163,8 @@ def gain(unit: str = "", shape: tuple[int | None, ...] = (), default: Any = MISS
     """Declare a law's or a reference's parameter: its SI unit and array shape (None: any length).
 
     The scenario's loader checks the table against both. A gain without a default that is named
-    like one of the plant's properties (``inertia``, ``wheel_axes``, ``wheel_inertia``), or
+    like one of the plant's properties (``inertia``, ``wheel_axes``, ``wheel_inertia``; with gimbals
+    that have speed loops ``gimbal_axes`` and ``spin_axes``), or
     ``control_period`` or ``inner_period``, may be left out of the table: it is then taken from the
     vehicle as flown.
     """

@@ -76,7 +76,7 @@ def _armature(model: Any) -> Iterator[str]:
     bare.dof_armature[:] = 0.0
     bare.actuator_armature[:] = 0.0
     bare.tendon_armature[:] = 0.0
-    with_it, without = np.diag(_mass_matrix(model)), np.diag(_mass_matrix(bare))
+    with_it, without = np.diag(mass_matrix(model)), np.diag(mass_matrix(bare))
     for dof in np.flatnonzero(with_it != without):
         share = 1.0 - without[dof] / with_it[dof]
         yield (
@@ -110,7 +110,7 @@ def _stiff_joints(model: Any) -> Iterator[str]:
         return
     damping, stiffness = _servo(model)
     # What a torque between two bodies has to move: the inertia seen from the joint.
-    inertia = 1.0 / np.diag(np.linalg.inv(_mass_matrix(model))) if model.nv else np.zeros(0)
+    inertia = 1.0 / np.diag(np.linalg.inv(mass_matrix(model))) if model.nv else np.zeros(0)
     step = model.opt.timestep
     for dof in np.flatnonzero((damping > 0.0) | (stiffness > 0.0)):
         if model.jnt_type[model.dof_jntid[dof]] == mujoco.mjtJoint.mjJNT_FREE:
@@ -190,7 +190,8 @@ def _servo(model: Any) -> tuple[Array, Array]:
     return damping, stiffness
 
 
-def _mass_matrix(model: Any) -> Array:
+def mass_matrix(model: Any) -> Array:
+    """Return the mass matrix (nv, nv), joints at rest."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     matrix = np.zeros((model.nv, model.nv))

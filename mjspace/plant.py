@@ -84,6 +84,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
         inertial, gyrostat = mass.bus(table, mass.own_inertia(spec.body("bus")))
     model = _compile(spec, inertial)
     guards.check(model)
+    driven = table.drives if table.servos is None else addresses.turned(model)
 
     return Vehicle(
         model=model,
@@ -92,7 +93,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
         wheel_inertia=addresses.frozen(np.full(len(axes), wheels.inertia)),
         torque_limit=wheels.torque_limit or np.inf,
         speed_limit=wheels.speed_limit or np.inf,
-        **addresses.of(model, len(axes), table.drives, engine=table.engine is not None),
+        **addresses.of(model, len(axes), driven, engine=table.engine is not None),
     )
 
 

@@ -64,6 +64,7 @@ UNITS = {
         "torque": "N m",
         "wheel_torque": "N m",
         "motor_torque": "N m",
+        "gimbal_rate": "rad/s",
         "thruster_torque": "N m",
         "dipole": "A m^2",
         "magnetic_moment": "A m^2",

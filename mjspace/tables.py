@@ -29,6 +29,7 @@ from mjspace.landing_tables import Engine, Ground
 from mjspace.magnetic_tables import Magnetorquers
 from mjspace.quantity import whole_number
 from mjspace.rcs_tables import Rcs
+from mjspace.servo_tables import Servos
 
 
 class Rates(Table):
@@ -128,6 +129,9 @@ class PlantTable(Table):
     drives: dict[Name, Pmsm] = {}
     """Electric motors that turn hinges of the parts, by the hinge: ``[plant.drives.cmg_outer]``. A
     hinge whose name ends in ``wheel`` is a wheel, any other a gimbal."""
+    servos: Servos | None = None
+    """Speed loops on every hinge of the parts that a motor turns, in place of ``drives``; none when
+    left out."""
     ripple: dict[Name, Ripple] = {}
     """Torque ripple of motors, by the hinge."""
     ideal_thrusters: bool = False
@@ -145,7 +149,11 @@ class PlantTable(Table):
 
     @model_validator(mode="after")
     def _one_kind_of_motor(self) -> "PlantTable":
-        kinds = {"drives": bool(self.drives), "engine": self.engine is not None}
+        kinds = {
+            "drives": bool(self.drives),
+            "servos": self.servos is not None,
+            "engine": self.engine is not None,
+        }
         given = [name for name, is_given in kinds.items() if is_given]
         if given and self.wheels.axes:
             raise ValueError("one kind of motor: set wheels.axes = [] to fly without wheels")

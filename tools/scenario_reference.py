@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
+from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 from types import NoneType, UnionType
@@ -111,7 +112,8 @@ def _kind(annotation: Any) -> str:
     if origin is dict:
         return f"table of {_kind(parts[1])}s by name"
     sizes, unit, scalar = _shape(annotation)
-    word = {float: "number", int: "whole number", str: "text", bool: "true or false"}[scalar]
+    words = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+    word = (words | {datetime: "date and time"})[scalar]
     count = f"{' x '.join(sizes)} {word}s" if sizes else word
     return f"{count} [{unit}]" if unit else count
 
