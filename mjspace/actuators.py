@@ -170,14 +170,15 @@ def _motor_torque(
     torque: Any, speed: Any, allocation: Any, spare: Any, limits: Any, ctrl: Any, saturated: Any
 ) -> None:
     torque_limit, speed_limit = limits[0], limits[1]
+    best, least = 0.0, 0.0
     for i in range(speed.size):
         wanted = 0.0
         for k in range(torque.size):
             wanted += allocation[i, k] * torque[k]
         ctrl[i] = wanted
+        least = max(least, abs(wanted))
     # The largest of |ctrl + t spare| is least where two wheels are level: all t of such pairs are
     # tried, and none, which stays where it is as good.
-    best, least = 0.0, np.abs(ctrl).max()
     for i in range(speed.size):
         for j in range(i):
             for sign in (-1.0, 1.0):
