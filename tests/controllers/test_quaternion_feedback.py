@@ -78,6 +78,19 @@ def test_the_sign_of_the_scalar_takes_the_shorter_way(q0: Array) -> None:
     )
 
 
+@pytest.mark.parametrize("kind", [Fixed, Switched])
+def test_a_sensor_may_report_either_sign_once_it_has_begun(kind: Any) -> None:
+    feedback, wanted = law(kind), at_rest()
+    turns = (200.0, 190.0, 175.0, 160.0)
+    seen = [Measurement(turned(angle), 0.1 * AXIS, np.zeros(3)) for angle in turns]
+    one = other = feedback.reset(seen[0], wanted)
+    for k, sample in enumerate(seen):
+        flipped = sample._replace(attitude=(-1.0) ** k * sample.attitude)
+        one, command, _ = feedback.step(one, 0.0, sample, wanted)
+        other, same, _ = feedback.step(other, 0.0, flipped, wanted)
+        np.testing.assert_array_equal(same.torque, command.torque)
+
+
 def test_a_negative_gain_wants_the_other_quaternion() -> None:
     of = flight(law(Fixed, attitude_gain=-1.0), turned(340.0), 110.0)
     assert of.attitude[-1, 0] == pytest.approx(-1.0, abs=1e-6)
