@@ -208,14 +208,24 @@ def plot(
         list[str],
         typer.Option("--signal", help="Plot this signal, as truth.rate[0]; repeatable."),
     ] = [],  # noqa: B006
+    phase: Annotated[
+        tuple[str, str] | None,
+        typer.Option(metavar="X Y", help="Plot a phase plane: one signal against another."),
+    ] = None,
 ) -> None:
     """Plot a log to a PNG page."""
-    from mjspace.errors import blamed_on
+    from mjspace import phase_plot
+    from mjspace.errors import InputError, blamed_on
     from mjspace.plot import plot as to_picture
 
+    if phase and signals:
+        raise InputError("--phase: is a picture of its own: leave --signal out")
     open_log(log)
     with blamed_on("plot"):
-        to_picture(log, output, signals=signals)
+        if phase:
+            phase_plot.plot(log, output, *phase)
+        else:
+            to_picture(log, output, signals=signals)
     print(output)
 
 

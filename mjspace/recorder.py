@@ -70,7 +70,10 @@ UNITS = {
         "magnetic_moment": "A m^2",
         "thrust": "N",
         "gimbal": "rad",
+        "on_time": "s",
+        "thruster_thrust": "N",
     },
+    "/law": {"angle": "rad", "angle_rate": "rad/s"},
     "/disturbance": {"force": "N", "torque": "N m"},
 }
 
