@@ -29,6 +29,24 @@ class Hold:
 
 
 @dataclass(frozen=True)
+class Turning:
+    """A turn at a constant rate: of axes that look at the planet from a circular orbit."""
+
+    rate: Array = gain("rad/s", (3,))
+    """In the axes that turn."""
+    attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0))
+    """At time zero: quaternion, scalar first, body to inertial; normalized."""
+
+    def __post_init__(self) -> None:
+        _require_direction("attitude", self.attitude)
+
+    def at(self, time: Array) -> Reference:
+        """Return the turn at each ``time`` [s]."""
+        steady = time, np.ones_like(time), np.zeros_like(time)
+        return _turn(att.normalize(self.attitude), self.rate, steady)
+
+
+@dataclass(frozen=True)
 class Slew:
     """A rest-to-rest turn about the eigenaxis, the shorter way, with a quintic angle."""
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from mjspace import addresses, central_gravity, environment, plant
+from mjspace import addresses, central_gravity, deployments, environment, plant
 from mjspace.actuators import Actuators, IdealThrusters, ReactionWheels
 from mjspace.combined_actuators import Together
 from mjspace.components import construct, load_object, source_of
 from mjspace.contract import Array, Law, ReferenceSource
+from mjspace.deployments import Deployments
 from mjspace.engine import GimballedEngine
 from mjspace.errors import blamed_on
 from mjspace.faults import FaultSet
@@ -46,6 +47,8 @@ class Assembly:
     actuators: Together
     reference: ReferenceSource
     law: Law
+    deployed: Callable[[Any], Deployments] | None
+    """Makes a batch's deployments; None where nothing is deployed."""
     disturbance: Callable[..., tuple[Any, Any]] | None
     """The user's own Python disturbance."""
     sources: dict[str, str]
@@ -126,6 +129,8 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             update={"python": _in_log("disturbance", kind)}
         )
     qpos, qvel = _part("initial", plant.initial_state, vehicle, scenario.initial)
+    parts = scenario.plant.parts
+    deployments.stow(vehicle.model, qpos, parts)
     assembly = Assembly(
         scenario=scenario.model_copy(update=flown),
         vehicle=vehicle,
@@ -143,6 +148,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         actuators=_part("plant", _actuators, vehicle, scenario.plant, scenario.rates),
         reference=reference,
         law=law if getattr(law, "batched", False) else OneByOne(law),
+        deployed=deployments.of(vehicle.model, qpos, parts, scenario.rates.physics),
         disturbance=disturbance,
         sources=sources,
     )

@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 
 from mjspace.actuators import Actuators, State
+from mjspace.addresses import is_thruster
 from mjspace.contract import Array, Measurement
+from mjspace.environment_kernel import MOMENT
 from mjspace.errors import FlightError
+from mjspace.thrusters import Thrusters
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,25 @@ class Together:
         """Return each field of MuJoCo's model that has changed, its body and the values."""
         burning = [kind.masses(state) for kind in self.kinds if hasattr(kind, "masses")]
         return [(name, *change) for masses in burning for name, change in masses.items()]
+
+    def inputs(self, batch: Any, motors: Sequence[str]) -> list[Array]:
+        """Return, of each kind, what it fills: a view of an input of the ``batch``.
+
+        ``motors`` are the vehicle's: the thrusters' inputs are the last, the others' the first.
+        """
+        thrusters = sum(map(is_thruster, motors))
+        views = []
+        for kind in self.kinds:
+            view = batch.bind(kind.acts_on)
+            part = slice(len(motors) - thrusters)
+            if kind.acts_on == "qfrc_applied":
+                part = slice(3, 6)  # the free joint comes first, its torque in body axes
+            elif kind.acts_on == "userdata":
+                part = MOMENT
+            elif isinstance(kind, Thrusters):
+                part = slice(view.shape[1] - thrusters, None)
+            views.append(view[:, part])
+        return views
 
     def reset(self, vehicles: int) -> State:
         """Return the state of all at the start."""

@@ -11,6 +11,7 @@ import numpy as np
 from mjspace import mass
 from mjspace.components import nearest
 from mjspace.contract import Array
+from mjspace.deployment_tables import Deployment
 from mjspace.hinge_tables import Hinge
 from mjspace.landing_tables import Ground
 from mjspace.rcs_tables import Rcs
@@ -98,7 +99,25 @@ def _attach_part(spec: Any, name: str, part: Part) -> None:
     child = mujoco.MjSpec.from_file(str(_ASSETS / f"parts/{part.part}/{part.part}.xml"))
     mount = spec.body("bus").add_frame(pos=part.position)
     mujoco.mju_euler2Quat(mount.quat, np.array(part.euler), "XYZ")  # about fixed axes
+    if part.deployment is not None:
+        stow = {"boom": _drive_out, "yo_yo": _hold}[part.part]
+        stow(child, part.deployment)
     spec.attach(child, prefix=f"{name}_", frame=mount)
+
+
+def _drive_out(boom: Any, deployment: Deployment) -> None:
+    """Make the boom's motor a position loop, which MuJoCo closes in every stage."""
+    drive, tip, w = boom.actuator("drive"), boom.body("tip"), deployment.bandwidth
+    drive.gainprm[0] = tip.mass * w**2
+    drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+    drive.biasprm[:3] = [0.0, -tip.mass * w**2, -2.0 * tip.mass * w]
+
+
+def _hold(yo_yo: Any, deployment: Deployment) -> None:
+    """Hold the weight where little of its cord is off the drum."""
+    held = yo_yo.equality("held")
+    held.active = True
+    held.data[0] = deployment.unwound - yo_yo.joint("unwind").ref
 
 
 def _hinge(spec: Any, name: str) -> Any:

@@ -10,18 +10,15 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from mjspace import environment, mujoco_log
-from mjspace.actuators import Actuators
-from mjspace.addresses import is_thruster
 from mjspace.assembly import Assembly
 from mjspace.columns import Columns
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.crossings import with_crossings
-from mjspace.environment_kernel import FIELD, MOMENT
+from mjspace.environment_kernel import FIELD
 from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.start import Start, last_period
 from mjspace.tape import Block, Tape, until_trouble
-from mjspace.thrusters import Thrusters
 
 BLOCK_PERIODS = 500
 BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
@@ -88,7 +85,9 @@ class _Flight:
             self.batch.expand(name)[:] = values
         if start.model:
             self.batch.set_const()
-        self.applied = [self._applied(kind) for kind in assembly.actuators.kinds]
+        self.applied = assembly.actuators.inputs(self.batch, assembly.vehicle.motors)
+        deployed = assembly.deployed
+        self.deployments = deployed and deployed(self.batch)
         self.field = assembly.field
         if self.field is not None:
             self.acting_field = self.batch.bind("userdata")[:, FIELD]
@@ -103,7 +102,8 @@ class _Flight:
             self.push = HeldDisturbance(assembly.disturbance, applied)
         self.hold = assembly.hold
         self.driven_stepwise = assembly.driven_stepwise
-        self.stepwise = self.driven_stepwise or self.push is not None
+        acts = self.push is not None or self.deployments is not None
+        self.stepwise = self.driven_stepwise or acts
         self.steps = scenario.rates.steps
         self.tick = math.gcd(self.steps, *self.suite.ticks)
         recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
@@ -157,6 +157,8 @@ class _Flight:
             self.acting_field[:] = self.field.piece(now)
         if self.push is not None:
             tape.push.append(self.push(now, truth))
+        if self.deployments is not None:
+            tape.happened += self.deployments(now)
         # Derived fields lag the state by one substep: the first substep computes those of `now`.
         if flown:
             self.batch.step()
@@ -170,7 +172,7 @@ class _Flight:
         tape.signals.append(signals)
         tape.sensordata.append(self.sensordata.copy())
         if flown and self.steps > 1:
-            self._rest_of_period(period * self.steps, command)
+            self._rest_of_period(tape, period * self.steps, command)
 
     def _ask_law(
         self, now: float, measurement: Measurement, reference: Wanted
@@ -212,22 +214,10 @@ class _Flight:
             self.batch.expand(name)[:, body] = values
         self.batch.set_const()
 
-    def _applied(self, kind: Actuators) -> Array:
-        """Return the view of MuJoCo's input that actuators of a kind fill."""
-        view: Array = self.batch.bind(kind.acts_on)
-        if kind.acts_on == "qfrc_applied":
-            return view[:, 3:6]  # the free joint comes first, its torque in body axes
-        if kind.acts_on == "userdata":
-            return view[:, MOMENT]
-        motors = self.assembly.vehicle.motors
-        others = sum(not is_thruster(name) for name in motors)
-        of_kind = slice(others, None) if isinstance(kind, Thrusters) else slice(others)
-        return view[:, of_kind]
-
     def _truth(self, physics: Array) -> Measurement:
         return self.actuators.seen(self.actuator_state, self.columns.truth(physics))
 
-    def _rest_of_period(self, first_step: int, command: Any) -> None:
+    def _rest_of_period(self, tape: Tape, first_step: int, command: Any) -> None:
         """Integrate from the period's first substep to its end, with the samples due in between."""
         step, physics_step = 1, self.assembly.scenario.rates.physics
         looks_always = self.inner is not None or self.push is not None
@@ -243,6 +233,8 @@ class _Flight:
                     self.push(now, truth)
                 if self.driven_stepwise:
                     self._drive(now, command, seen, truth)
+                if self.deployments is not None:
+                    tape.happened += self.deployments(now)
             count = 1 if self.stepwise else self.tick - step % self.tick
             self.batch.step(nstep=count)
             step += count

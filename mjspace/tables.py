@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import model_validator
 
+from mjspace.deployment_tables import Deployment
 from mjspace.drive_tables import Pmsm
 from mjspace.fields import (
     Angle,
@@ -100,6 +101,19 @@ class Part(Table):
     """Of its origin in the bus."""
     euler: Angles3 = [0.0, 0.0, 0.0]
     """Roll, pitch, yaw of its axes in the bus's."""
+    deployment: Deployment | None = None
+    """Of a boom or a yo-yo; it moves as it likes when left out."""
+
+    @model_validator(mode="after")
+    def _deployable(self) -> "Part":
+        if self.deployment is None:
+            return self
+        if self.part not in ("boom", "yo_yo"):
+            raise ValueError(f"deployment: a {self.part} has none, a boom or a yo_yo has")
+        given = self.deployment.length is not None, self.deployment.rate is not None
+        if given != (self.part == "boom",) * 2:
+            raise ValueError("deployment: length and rate are a boom's, which needs both")
+        return self
 
 
 class PlantTable(Table):

@@ -14,6 +14,7 @@ from mjspace.controllers.references import (
     Regulation,
     Slew,
     Sweep,
+    Turning,
 )
 from mjspace.controllers.tabulated import Table
 
@@ -35,6 +36,7 @@ time = st.floats(0.5, 4.0)
 angles = arrays(float, 3, elements=st.floats(0.1, 0.7))
 SOURCES = st.one_of(
     st.builds(Hold, quaternion),
+    st.builds(Turning, vector, quaternion),
     st.builds(Slew, quaternion, time, st.floats(-1.0, 2.0), quaternion),
     st.builds(Regulation, st.floats(-12.0, 12.0), time, vector),
     st.builds(Sweep, st.floats(-1.0, 1.0), st.just(0.5), time, vector),
