@@ -73,6 +73,17 @@ def test_it_is_the_pseudo_inverse() -> None:
         assert damping[0] == 0.0
 
 
+def test_the_robust_inverse_is_the_formulas() -> None:
+    time = 0.7
+    one, two, three = 0.3 * np.sin(0.5 * np.pi * (time + np.array([0.0, 1.0, 2.0])))
+    E = np.array([[1.0, three, two], [three, 1.0, one], [two, one, 1.0]])
+    for angle in ELLIPTIC + 0.05 * np.random.default_rng(2).normal(size=(20, 4)):
+        A, wanted = torque_matrix(angle), np.array([0.5, -0.2, 0.3])
+        rate, _, damping = steer(PYRAMID, wanted, angle, SPEED, np.array([time]), ROBUST)
+        inverse = A.T @ np.linalg.inv(A @ A.T + damping[0] * E)
+        np.testing.assert_allclose(rate, -inverse @ wanted / H0, atol=1e-8)  # by differences
+
+
 def test_the_pyramid_at_zero_angles() -> None:
     _, measure, _ = steer(PYRAMID, np.zeros(3), np.zeros(4), SPEED, START, EXACT)
     # A A^T = diag(2 cos^2, 2 cos^2, 4 sin^2) of the skew: 32/27
