@@ -45,7 +45,8 @@ def construct(
 
     A parameter that the table leaves out is taken from ``facts`` where they hold its name (the
     vehicle's properties), else from its default; the component as flown has all written out.
-    ``file`` gives the rows of a table read from a CSV file with a header of parameter names.
+    ``file`` gives the rows of a table read from a CSV file with a header of parameter names. A
+    table in a gain that has a ``kind`` is constructed in the same way.
 
     Raises:
         ValueError: an unknown, missing or misshapen gain, with its name and what would be right.
@@ -57,6 +58,10 @@ def construct(
     for name in gains:
         if name not in parameters:
             raise ValueError(f"{name}: {component.kind} has no such key{nearest(name, parameters)}")
+    inside = {name: gain for name, gain in gains.items() if _has_kind(gain)}
+    written = {}
+    for name, gain in inside.items():
+        gains[name], written[name] = _within(name, gain, facts, folder)
     values = {name: facts[name] for name in parameters if name in facts} | gains
     missing = [
         name
@@ -68,8 +73,40 @@ def construct(
     declared = {f.name: f.metadata for f in dataclasses.fields(kind)} if _is_data(kind) else {}
     values = {name: _value(name, v, declared.get(name, {})) for name, v in values.items()}
     built = kind(**values)
-    flown = {name: getattr(built, name, values.get(name)) for name in parameters}
+    flown = {name: getattr(built, name, values.get(name)) for name in parameters} | written
     return built, Component(kind=component.kind, **{k: plain(v) for k, v in flown.items()})
+
+
+def _has_kind(value: Any) -> bool:
+    """Return whether the gain is, or holds, a table with a ``kind``."""
+    if isinstance(value, Mapping):
+        return "kind" in value or any(map(_has_kind, value.values()))
+    return isinstance(value, list) and any(map(_has_kind, value))
+
+
+def _within(key: str, value: Any, facts: Mapping[str, Any], folder: Path) -> tuple[Any, Any]:
+    """Return the gain with every table that has a ``kind`` constructed, and as flown."""
+    if isinstance(value, list):
+        pairs = [_within(f"{key}.{n}", item, facts, folder) for n, item in enumerate(value)]
+        return [built for built, _ in pairs], [flown for _, flown in pairs]
+    if not isinstance(value, Mapping):
+        return value, value
+    if "kind" not in value:
+        items = {name: _within(f"{key}.{name}", v, facts, folder) for name, v in value.items()}
+        return {n: built for n, (built, _) in items.items()}, {
+            n: flown for n, (_, flown) in items.items()
+        }
+    inner = Component.model_validate(value)
+    try:
+        if inner.kind.partition(":")[0].endswith(".py"):
+            raise ValueError(
+                f"{inner.kind}: a law within another comes from a module, as the log "
+                "keeps the text of one file alone"
+            )
+        built, flown = construct(inner, load_object(inner.kind, folder), facts, folder)
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from error
+    return built, {"kind": flown.kind, **flown.gains}
 
 
 def source_of(kind: type) -> str:
