@@ -22,6 +22,11 @@ _STOP_SPRING = [0.005, 1.0]  # s, damping ratio: of what turns there, whatever i
 _STOP_HARDNESS = [0.95, 0.99, 0.001, 0.5, 2.0]  # MuJoCo's solimp
 _HYDRAZINE = 1010.0  # kg/m^3 at 20 deg C
 _UNSEEN = 5  # a group of sites that no picture shows
+_NOZZLE_AND_PLUME = (
+    # name, shape, size [m], how far out its centre is [m], color
+    ("nozzle", mujoco.mjtGeom.mjGEOM_CYLINDER, [0.03, 0.035, 0.0], 0.03, [0.15, 0.15, 0.17, 1.0]),
+    ("plume", mujoco.mjtGeom.mjGEOM_ELLIPSOID, [0.06, 0.06, 0.26], 0.3, [0.5, 0.72, 1.0, 0.0]),
+)
 _WHEEL_GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
 
 
@@ -147,13 +152,24 @@ def _bear(joint: Any, hinge: Hinge) -> None:
 
 
 def _add_thrusters(spec: Any, rcs: Rcs) -> None:
-    """Let each thruster push on the bus at its place; put the propellant at the body origin."""
+    """Let each thruster push on the bus at its place; put the propellant at the body origin.
+
+    Its plume is a shape that nobody sees until a picture shows it.
+    """
     bus = spec.body("bus")
+    spec.add_material(name="thruster", emission=0.8)
     for index, (place, way) in enumerate(zip(rcs.positions, rcs.unit_directions, strict=True)):
         name = f"thruster_{index}"
         bus.add_site(name=name, pos=place, group=_UNSEEN)
         pushes = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": name}
         spec.add_actuator(name=name, gear=[*way, 0.0, 0.0, 0.0], **pushes)
+        out = -np.array(way)
+        for drawn, kind, size, ahead, color in _NOZZLE_AND_PLUME:
+            geom = bus.add_geom(type=kind, size=size, pos=place + ahead * out, rgba=color)
+            geom.name, geom.group, geom.mass = f"{name}_{drawn}", 2, 0.0
+            geom.contype = geom.conaffinity = 0
+            geom.material = "thruster" if drawn == "plume" else ""
+            mujoco.mju_quatZ2Vec(geom.quat, out)
     if rcs.propellant is not None:
         radius = np.cbrt(rcs.propellant / (4.0 / 3.0 * np.pi * _HYDRAZINE))
         tank = bus.add_body(name="rcs_tank", mass=rcs.propellant, explicitinertial=True)

@@ -1,6 +1,7 @@
 """A log as a video or a picture: the model that is in it, drawn as it was at each frame's time."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -98,14 +99,18 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
     scenario = scenario_of(log)
     stage = Stage(from_bytes(log.attachment("model.mjb.gz")), camera, scenario.environment.orbit)
     left = scenario.name, scenario.law.kind
+    pulses: Iterable[Array | None] = repeat(None, len(times))
+    if "on_time" in log.topics.get("/command", {}):
+        pulses = nearest_rows(log, "/command", "on_time", times)
     with Canvas(stage.model, size) as canvas:
-        for time, physics, wanted in zip(
+        for time, physics, wanted, on_time in zip(
             times,
             nearest_rows(log, "/state", "physics", times),
             nearest_rows(log, "/reference", "attitude", times),
+            pulses,
             strict=True,
         ):
-            attained = stage.set(float(time), physics, wanted)
+            attained = stage.set(float(time), physics, wanted, on_time)
             error = float(attitude.rotation_angle(attained, wanted))
             right = f"{time:.2f} s", f"attitude error {overlay.angle_text(error)}"
             yield overlay.write(canvas.draw(stage.scene), left, right)

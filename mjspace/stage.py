@@ -10,10 +10,12 @@ from mjspace.contract import Array
 from mjspace.environment import orbit_position
 from mjspace.environment_tables import Orbit
 
+_GEOM = mujoco.mjtObj.mjOBJ_GEOM
 AXES = 3
 """The geom group of a model's body axes: not part of the vehicle, shown in pictures."""
 _HALO, _TRANSLUCENT = 2.2, 0.4  # the wanted axes' thickness, and their opacity
 _FASTEST = np.radians(30.0)  # a frame; a rotor of four spokes seems to reverse beyond 45 degrees
+_PLUME = 0.45  # the opacity of a thruster's plume
 _SPARE_GEOMS = 64  # beside the model's own: the wanted axes, and room
 
 
@@ -43,13 +45,19 @@ class Stage:
         self._camera.fixedcamid = names.index(camera)
         self._axes = np.flatnonzero(model.geom_group == AXES).tolist()
         self._rotors = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]
+        plumes = [mujoco.mj_name2id(model, _GEOM, f"thruster_{i}_plume") for i in range(model.nu)]
+        self._plumes = [geom for geom in plumes if geom >= 0]
         self._angle: Array | None = None
         self._orbit = orbit
         self._planet = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "planet")
         self._below = model.geom_pos[self._planet].copy(), model.geom_quat[self._planet].copy()
 
-    def set(self, time: float, physics: Array, wanted: Array) -> Array:
+    def set(
+        self, time: float, physics: Array, wanted: Array, on_time: Array | None = None
+    ) -> Array:
         """Show ``time`` [s]: a row of MuJoCo's integration state, and the wanted attitude (4,).
+
+        Thrusters whose ``on_time`` (n,) is more than zero have a plume.
 
         Returns the attitude (4,) of the bus.
         """
@@ -58,6 +66,8 @@ class Stage:
         self._turn_rotors()
         if self._orbit is not None and self._planet >= 0:
             self._turn_planet(orbit_position(self._orbit, time))
+        if on_time is not None:
+            model.geom_rgba[self._plumes, 3] = _PLUME * (on_time > 0.0)
         mujoco.mj_fwdPosition(model, data)
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(

@@ -11,6 +11,7 @@ from mjspace.flight import run
 from mjspace.loading import load
 from mjspace.replay import verify
 from mjspace.simulation import fly
+from mjspace.stage import Stage
 from mjspace.start import first_start
 
 # Pulses that are longer than a period, under way between two, and closed within a step.
@@ -65,6 +66,20 @@ def test_a_batch_is_as_one_and_its_tanks_empty() -> None:
             for vehicle in range(3):
                 np.testing.assert_array_equal(many.rows[topic][name][:, vehicle], alone[:, 0])
     assert 0.99 < one.rows["/truth"]["propellant"][-1, 0, 0] < 0.9999
+
+
+def test_a_picture_shows_the_plumes_of_those_that_are_on() -> None:
+    built = assemble(*load("detumble-thrusters"))
+    model, start = built.vehicle.model, first_start(built, [0])
+    stage = Stage(model, "chase", None)
+    on_time = np.zeros(12)
+    on_time[[3, 7]] = 0.01
+    stage.set(0.0, start.physics[0], np.array([1.0, 0.0, 0.0, 0.0]), on_time)
+    shown = [i for i in range(12) if model.geom(f"thruster_{i}_plume").rgba[3] > 0.0]
+    assert shown == [3, 7]
+    # the third pushes up at the bottom edge: its plume points down
+    plume = model.geom("thruster_2_plume")
+    np.testing.assert_allclose(plume.pos, [0.0, -0.4, -0.8], atol=1e-12)
 
 
 def test_a_lander_may_have_them_beside_its_engine() -> None:

@@ -43,6 +43,22 @@ def test_on_its_reference_the_torque_is_what_the_motion_needs() -> None:
     np.testing.assert_allclose(signals.torque, change, rtol=1e-6)
 
 
+def test_the_wanted_acceleration_is_seen_from_the_turning_body() -> None:
+    step, rate = 1e-4, np.array([0.3, -0.2, 0.1])
+    attitude = att.normalize(np.array([0.8, 0.3, -0.4, 0.2]))
+    seen_rates = []
+    for k in (-1, 1):
+        reference = wanted(3.0 + k * step)
+        body = att.multiply(attitude, att.from_rotation_vector(k * step * rate))
+        inertial = att.rotate(reference.attitude, reference.rate)
+        seen_rates.append(att.rotate(att.conjugate(body), inertial))
+    acceleration = (seen_rates[1] - seen_rates[0]) / (2.0 * step)
+    seen, flown = Measurement(attitude, rate, NOTHING), law(attitude_gain=0.0, rate_gain=0.0)
+    _, _, signals = flown.step(flown.reset(seen, wanted(3.0)), 0.0, seen, wanted(3.0))
+    expected = INERTIA @ acceleration + np.cross(rate, INERTIA @ rate)
+    np.testing.assert_allclose(signals.torque, expected, rtol=1e-6)
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_it_turns_back_and_brakes(sign: float) -> None:
     turned = att.from_rotation_vector(np.array([0.2, -0.1, 0.3]))
