@@ -3,7 +3,6 @@
 All arrays may have leading vehicle axes: every vehicle is in a phase of its own.
 """
 
-import re
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -48,11 +47,11 @@ class Until:
         return late & (value < self.below) & (value > self.above)
 
     def _parsed(self) -> tuple[str, int | None]:
-        match = re.fullmatch(r"(\w+)(?:\[(\d+)\])?", self.signal)
-        if match is None or match[1] not in Measurement._fields:
+        name, bracket, part = self.signal.removesuffix("]").partition("[")
+        if name not in Measurement._fields or (bracket and not part.isdigit()):
             have = ", ".join(Measurement._fields)
             raise ValueError(f"until.signal: no {self.signal!r} is measured: have {have}")
-        return match[1], int(match[2]) if match[2] else None
+        return name, int(part) if bracket else None
 
 
 @dataclass(frozen=True)
@@ -171,7 +170,7 @@ def _phase(number: int, table: Mapping[str, Any]) -> Phase:
     except (TypeError, ValueError) as error:
         keys = ", ".join(f.name for kind in (Phase, Until) for f in fields(kind))
         raise ValueError(f"phases.{number}: {error} (a phase and its until have {keys})") from None
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", phase.name):
+    if not (phase.name.isidentifier() and phase.name.islower()):
         raise ValueError(f"phases.{number}.name: {phase.name!r}: write a word in lower case")
     if not hasattr(phase.law, "step") or hasattr(phase.law, "inner"):
         raise ValueError(f"phases.{number}.law: wanted a table with a law's kind, without inner")
