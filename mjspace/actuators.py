@@ -17,7 +17,8 @@ class Actuators(Protocol):
     """The motors of a batch of vehicles: all memory in ``State``.
 
     Actuators that burn what they carry have a method ``masses(state)`` as well: for each field of
-    MuJoCo's model that has changed, the body and the vehicles' values, (N, ...).
+    MuJoCo's model that has changed, the body and the vehicles' values, (N, ...); and may have
+    ``billed(state, given, instead, step)``, which accounts for what faults make them give instead.
     """
 
     logged_as: ClassVar[str]

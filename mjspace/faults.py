@@ -52,7 +52,8 @@ class FaultSet:
         Raises:
             ValueError: no such motor, or a delay that is no whole number of holds.
         """
-        self._tables, self._hold, self._vehicles = tables, hold, len(members)
+        self._tables, self._kinds, self._hold = tables, kinds, hold
+        self._vehicles = len(members)
         known = _places(kinds, motors)
         self._places, self._delays, self._noises = [], [], []
         for number, fault in enumerate(tables):
@@ -127,6 +128,11 @@ class FaultSet:
             changed = result[place.kind].copy()
             changed[:, place.columns] = np.where(in_force[:, None], wrong, right)
             result[place.kind] = changed
+        for number, kind in enumerate(self._kinds):
+            if hasattr(kind, "billed"):
+                state, result[number] = kind.billed(
+                    state, given[number], result[number], self._hold
+                )
         return state, tuple(result)
 
     def _wrong(self, number: int, right: Array, past: Array | None, index: int) -> Array:

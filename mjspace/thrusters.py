@@ -102,6 +102,20 @@ class Thrusters:
         left = np.concatenate([truth.propellant, state["rcs_propellant"]], axis=-1)
         return truth._replace(thrust=thrust, propellant=left)
 
+    def billed(
+        self, state: State, given: Array, instead: Array, step: float
+    ) -> tuple[State, Array]:
+        """Return (state, thrust) where faults have made ``instead`` of what ``act`` gave, (N, n).
+
+        What is fired is burnt, and an empty tank fires nothing.
+        """
+        left, flow = state["rcs_propellant"], self.data[1]
+        if flow:
+            instead = np.where(left > 0.0, instead, 0.0)
+            burnt = flow * step * np.sum(instead - given, axis=-1, keepdims=True)
+            state = state | {"rcs_propellant": np.maximum(left - burnt, 0.0)}
+        return state, instead
+
     def masses(self, state: State) -> dict[str, tuple[int, Array]]:
         """Return, of MuJoCo's model, the body and the values of each field that burning changes."""
         if not self.tank:

@@ -110,6 +110,35 @@ def test_a_fault_that_cannot_be_is_refused_in_one_line(table: str, message: str)
     assert "\n" not in str(refused.value)
 
 
+SHORT = ["duration=4", "rates.control=0.01", "checks=[]"]  # a row for each integration step
+
+
+def burnt(thruster_fault: str, out: Path) -> tuple[Array, Array]:
+    """Return thrust (n, 12) [N] and propellant (n, 1) [kg] of thrusters that damp a rate."""
+    faults = f"faults=[{thruster_fault}]"
+    log = run("detumble-thrusters", overrides=[*SHORT, faults], out=out).log
+    return log.read("/command")["thruster_thrust"], log.read("/truth")["propellant"]
+
+
+def test_a_thruster_that_stays_open_burns_and_a_dead_one_does_not(tmp_path: Path) -> None:
+    stuck = "{motor='thruster_0',kind='biased',value=0.5,at=0},"
+    rich, poor = (
+        burnt(stuck, tmp_path / "open"),
+        burnt("{motor='thruster_thrust',kind='dead',at=0}", tmp_path / "dead"),
+    )
+    assert not poor[0].any()
+    assert np.ptp(poor[1]) < 1e-15
+    assert rich[0][:-1, 0].min() >= 0.5
+    used = rich[1][0, 0] - rich[1][-1, 0]
+    scenario, _ = load("detumble-thrusters")
+    rcs = scenario.plant.rcs
+    assert rcs is not None
+    assert rcs.specific_impulse is not None
+    flow = 1.0 / (rcs.specific_impulse * 9.80665)
+    assert used == pytest.approx(flow * rich[0][:-1].sum() * 0.01, rel=1e-9)
+    assert used > flow * 0.5 * 4.0
+
+
 def test_an_unknown_signal_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     fault = "{motor='wheel_0',kind='dead',when={signal='truth.ratte',below=1}}"
     with pytest.raises(InputError, match=r"faults.0.when.signal: no signal 'truth.ratte' .* did"):
