@@ -7,6 +7,7 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from mjspace.contract import Array
 from mjspace.video import Frame
 
 WHITE, GREY, SHADE = (255, 255, 255, 255), (200, 208, 220, 255), (0, 0, 0, 96)
@@ -33,6 +34,12 @@ def angle_text(angle: float) -> str:
     """Return an angle [rad] in degrees, to two decimals or, below those, two digits."""
     degrees = float(np.degrees(angle))
     return f"{degrees:.2f} deg" if degrees >= 0.01 else f"{degrees:.2g} deg"
+
+
+def path_text(position: Array, velocity: Array, error: Array) -> str:
+    """Return height [m], speed [m/s] and distance from the wanted path [m], of vectors (3,)."""
+    speed, off = float(np.linalg.norm(velocity)), float(np.linalg.norm(error))
+    return f"height {position[2]:.1f} m, speed {speed:.2f} m/s, {off:.2f} m off its path"
 
 
 @cache

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from mjspace import attitude, overlay
+from mjspace import overlay
 from mjspace.contract import Array
 from mjspace.flown import scenario_of
+from mjspace.landing_tables import Engine
 from mjspace.log_reader import Log
 from mjspace.offscreen import Canvas
 from mjspace.plant import from_bytes
@@ -103,14 +104,37 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
     if "on_time" in log.topics.get("/command", {}):
         pulses = nearest_rows(log, "/command", "on_time", times)
     with Canvas(stage.model, size) as canvas:
-        for time, physics, wanted, on_time in zip(
+        for time, physics, wanted, on_time, burning, how_well in zip(
             times,
             nearest_rows(log, "/state", "physics", times),
             nearest_rows(log, "/reference", "attitude", times),
             pulses,
+            _burning(log, scenario.plant.engine, times),
+            _how_well(log, times),
             strict=True,
         ):
-            attained = stage.set(float(time), physics, wanted, on_time)
-            error = float(attitude.rotation_angle(attained, wanted))
-            right = f"{time:.2f} s", f"attitude error {overlay.angle_text(error)}"
-            yield overlay.write(canvas.draw(stage.scene), left, right)
+            stage.set(float(time), physics, wanted, on_time, burning)
+            yield overlay.write(canvas.draw(stage.scene), left, (f"{time:.2f} s", how_well))
+
+
+def _burning(log: Log, engine: Engine | None, times: Array) -> Iterator[float]:
+    """Yield the engine's share of its largest thrust: 0 where there is none."""
+    if engine is None:
+        yield from repeat(0.0, len(times))
+    else:
+        for thrust in nearest_rows(log, "/truth", "thrust", times):
+            yield float(thrust[0]) / engine.thrust_max
+
+
+def _how_well(log: Log, times: Array) -> Iterator[str]:
+    """Yield what the caption says of the flight: its path where it has one, else its attitude."""
+
+    def truth(field: str) -> Iterator[Array]:
+        return nearest_rows(log, "/truth", field, times)
+
+    if "position_error" in log.topics["/truth"]:
+        for row in zip(truth("position"), truth("velocity"), truth("position_error"), strict=True):
+            yield overlay.path_text(*row)
+    else:
+        for error in truth("attitude_error"):
+            yield f"attitude error {overlay.angle_text(float(error[0]))}"

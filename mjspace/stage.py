@@ -9,6 +9,7 @@ from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.environment import orbit_position
 from mjspace.environment_tables import Orbit
+from mjspace.plume import Plume
 
 _GEOM = mujoco.mjtObj.mjOBJ_GEOM
 AXES = 3
@@ -51,13 +52,20 @@ class Stage:
         self._orbit = orbit
         self._planet = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "planet")
         self._below = model.geom_pos[self._planet].copy(), model.geom_quat[self._planet].copy()
+        self._plume = Plume(model)
 
     def set(
-        self, time: float, physics: Array, wanted: Array, on_time: Array | None = None
+        self,
+        time: float,
+        physics: Array,
+        wanted: Array,
+        on_time: Array | None = None,
+        burning: float = 0.0,
     ) -> Array:
         """Show ``time`` [s]: a row of MuJoCo's integration state, and the wanted attitude (4,).
 
-        Thrusters whose ``on_time`` (n,) is more than zero have a plume.
+        Thrusters whose ``on_time`` (n,) is more than zero have a plume; that of an engine is as
+        long as ``burning``, its share of full thrust, says.
 
         Returns the attitude (4,) of the bus.
         """
@@ -68,11 +76,13 @@ class Stage:
             self._turn_planet(orbit_position(self._orbit, time))
         if on_time is not None:
             model.geom_rgba[self._plumes, 3] = _PLUME * (on_time > 0.0)
+        self._plume.burn(burning, self._option)
         mujoco.mj_fwdPosition(model, data)
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(
             model, data, self._option, self._perturb, self._camera, everything, self.scene
         )
+        self._plume.lift_shadow(self.scene)
         for geom in self._axes:
             self._add_wanted(geom, wanted)
         bus: Array = data.body("bus").xquat.copy()

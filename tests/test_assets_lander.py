@@ -1,5 +1,6 @@
 """The lander's model and the Moon's grounds: what touches, what is level, how it all looks."""
 
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjspace import composition
+from mjspace import composition, plume
 from mjspace.contract import Array
 from mjspace.errors import NoRendererError
 from mjspace.landing_tables import Ground
@@ -17,8 +18,10 @@ from mjspace.tables import PlantTable, Wheels
 ASSETS = Path(__file__).parent.parent / "assets"
 GROUNDS = ["moon_plain", "moon_craters"]
 PADS = {f"leg_{i}_pad" for i in range(4)}
+SHELL = {"shell", "shell_top", "engine_shell", *(f"knee_{i}" for i in range(4))}
 HALF = 100.0  # m, half the edge of the ground that is landed on
-PLUME = 4  # geom group
+HIDDEN = 5  # geom group
+WEIGHT = 1.62  # m/s^2
 
 
 def landscape(ground: str, **table: float) -> Any:
@@ -38,11 +41,12 @@ def height(model: Any, x: float, y: float) -> float:
 
 
 @pytest.mark.parametrize("ground", GROUNDS)
-def test_pads_touch_the_ground_and_nothing_else_does(ground: str) -> None:
+def test_pads_and_shell_touch_the_ground_and_nothing_else_does(ground: str) -> None:
     model = landscape(ground)
     names = [model.geom(i).name for i in range(model.ngeom)]
-    assert {names[i] for i in np.flatnonzero(model.geom_contype)} == PADS
+    assert {names[i] for i in np.flatnonzero(model.geom_contype)} == PADS | SHELL
     assert {names[i] for i in np.flatnonzero(model.geom_conaffinity)} == {"site_ground"}
+    assert {names[i] for i in np.flatnonzero(model.geom_group == HIDDEN)} == SHELL
     for file in ("lander/scene.xml", f"parts/{ground}/{ground}.xml"):
         for geom in mujoco.MjSpec.from_file(str(ASSETS / file)).geoms:
             assert geom.mass == 0.0, geom.name
@@ -65,7 +69,7 @@ def test_the_site_is_level_and_the_ground_meets_what_is_around_it() -> None:
 def test_it_stands_where_it_comes_down(ground: str) -> None:
     model = landscape(ground)
     data = mujoco.MjData(model)
-    model.opt.gravity[2] = -1.62
+    model.opt.gravity[2] = -WEIGHT
     data.qpos[2] += 0.2
     hinges = [model.joint("engine_outer"), model.joint("engine_inner")]
     angle = [hinge.qposadr[0] for hinge in hinges]
@@ -81,7 +85,7 @@ def test_it_stands_where_it_comes_down(ground: str) -> None:
     assert tilt < (1e-6 if ground == "moon_plain" else 5.0)  # deg; 2 measured in the craters
     # Each strut carries a quarter of the weight but its own foot's: 24.25 kg 1.62 / 2500 N/m.
     sunk = [data.joint(f"leg_{i}_strut").qpos[0] for i in range(4)]
-    assert np.mean(sunk) == pytest.approx(24.25 * 1.62 / 2500.0, rel=0.01)
+    assert np.mean(sunk) == pytest.approx(24.25 * WEIGHT / 2500.0, rel=0.01)
 
 
 def test_the_plume_leaves_the_nozzle_at_any_length() -> None:
@@ -90,19 +94,59 @@ def test_the_plume_leaves_the_nozzle_at_any_length() -> None:
     for name in ("engine_plume_core", "engine_plume", "engine_plume_veil"):
         geom = model.geom(name)
         assert geom.bodyid[0] == nozzle
-        assert geom.group[0] == PLUME
+        assert geom.group[0] == plume.PLUME
         # Its upper end lies at the throat, whatever its half length is scaled to.
         assert geom.pos[2] + geom.size[2] == pytest.approx(-0.22, abs=1e-12)
     assert not model.light("engine_glow").active[0]
 
 
-def picture(model: Any, data: Any, camera: str, plume: bool = False) -> Array:
+def test_a_plume_is_as_long_as_the_thrust_and_keeps_its_root() -> None:
+    model, option = landscape("moon_plain"), mujoco.MjvOption()
+    engine, full = plume.Plume(model), model.geom("engine_plume").size[2]
+    opacity = model.material("engine_plume").rgba[3]
+    for share in (0.25, 1.0, 0.25):  # nothing of what was drawn before is left
+        engine.burn(share, option)
+        geom = model.geom("engine_plume")
+        assert option.geomgroup[plume.PLUME]
+        assert model.light("engine_glow").active[0]
+        assert geom.size[2] == pytest.approx(share * full)
+        assert geom.pos[2] + geom.size[2] == pytest.approx(-0.22, abs=1e-12)
+        assert model.material("engine_plume").rgba[3] == pytest.approx(np.sqrt(share) * opacity)
+    engine.burn(0.0, option)
+    assert not option.geomgroup[plume.PLUME]
+    assert not model.light("engine_glow").active[0]
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+@pytest.mark.parametrize("tilt", [60.0, 120.0, 180.0])
+def test_a_crash_does_not_sink(ground: str, tilt: float) -> None:
+    model = landscape(ground)
+    data = mujoco.MjData(model)
+    model.opt.gravity[2] = -WEIGHT
+    data.qpos[2] = 3.0
+    data.qpos[3:7] = np.cos(np.radians(tilt / 2.0)), np.sin(np.radians(tilt / 2.0)), 0.0, 0.0
+    data.qvel[2] = -10.0
+    deepest = 0.0
+    for _ in range(4000):
+        mujoco.mj_step(model, data)
+        deepest = min(deepest, data.contact.dist[: data.ncon].min(initial=0.0))
+    assert [warning.number for warning in data.warning] == [0] * len(data.warning)
+    assert deepest > -0.05  # m; 1.5 to 3.2 cm measured, on impact at 10 m/s
+    lying = [data.geom(name).xpos for name in PADS | SHELL]
+    assert min(z - height(model, x, y) for x, y, z in lying) > 0.0
+
+
+def picture(model: Any, burning: float = 0.0) -> Array:
+    """Return what the camera ``chase`` sees of a model that has not burnt before."""
+    model, data = copy(model), mujoco.MjData(model)
     scene, view, option = mujoco.MjvScene(model, 500), mujoco.MjvCamera(), mujoco.MjvOption()
-    view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED.value, model.camera(camera).id
-    option.geomgroup[PLUME] = plume
+    engine = plume.Plume(model)
+    engine.burn(burning, option)
+    view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED.value, model.camera("chase").id
     mujoco.mj_forward(model, data)
     every = mujoco.mjtCatBit.mjCAT_ALL.value
     mujoco.mjv_updateScene(model, data, option, None, view, every, scene)
+    engine.lift_shadow(scene)
     try:
         with Canvas(model, (320, 180)) as canvas:
             return canvas.draw(scene).astype(float)
@@ -112,8 +156,7 @@ def picture(model: Any, data: Any, camera: str, plume: bool = False) -> Array:
 
 def test_a_picture_shows_sky_ground_shadow_and_plume() -> None:
     model = landscape("moon_plain")
-    data = mujoco.MjData(model)
-    chase = picture(model, data, "chase")
+    chase = picture(model)
     sky = chase[:25]
     assert np.median(sky) < 5.0
     assert (sky.max(axis=2) > 60.0).sum() > 5  # stars
@@ -121,9 +164,11 @@ def test_a_picture_shows_sky_ground_shadow_and_plume() -> None:
     ground = chase[-30:].mean(axis=2)
     assert 80.0 < np.median(ground) < 180.0
     model.light_castshadow[:] = False
-    assert (picture(model, data, "chase").sum(axis=2) - chase.sum(axis=2) > 90.0).sum() > 400
-    burning = picture(model, data, "chase", plume=True)
-    assert (burning.sum(axis=2) - chase.sum(axis=2) > 60.0).sum() > 100
+    assert (picture(model).sum(axis=2) - chase.sum(axis=2) > 90.0).sum() > 400
+    dark = picture(model).sum(axis=2)
+    flame = [(picture(model, share).sum(axis=2) - dark > 60.0).sum() for share in (0.3, 1.0)]
+    assert flame[0] > 20  # pixels; 40 and 64 measured
+    assert flame[1] > 1.4 * flame[0]
 
 
 def test_the_wide_camera_sees_the_whole_descent() -> None:

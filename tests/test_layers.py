@@ -36,7 +36,7 @@ ONLY_IN = {
             "tape",
             "recorder",
         ),
-        *("mujoco_log", "stand", "meter", "passport", "convergence"),
+        *("mujoco_log", "stand", "meter", "passport", "convergence", "plume"),
         *("geometry", "offscreen", "render", "stage", "replay", "environments", "dm_bridge"),
     ),
     "mcap": ("log_*",),
