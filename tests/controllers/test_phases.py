@@ -69,6 +69,7 @@ def test_a_phase_flies_its_law_from_its_beginning() -> None:
     damp = RateDamping(rate_gain=3.0, **FACTS)
     point = Switched(**FACTS)
     first, later = seen([0.0, 0.05, 0.3]), seen([0.0, 0.02, 0.04])
+    later = later._replace(attitude=-later.attitude)  # a law that began before would keep its sign
     state = law.reset(first, REST)
     alone = damp.reset(first, REST)
     for time in (0.0, 0.1):
@@ -82,6 +83,7 @@ def test_a_phase_flies_its_law_from_its_beginning() -> None:
     state, command, signals = law.step(state, 0.3, later, REST)
     _, torque, shown = point.step(point.reset(later, REST), 0.3, later, REST)
     np.testing.assert_array_equal(command.torque, torque.torque)
+    np.testing.assert_array_equal(signals.point_error, shown.error)
     assert state.point_path[0, 0] == pytest.approx(0.1 * np.hypot(0.02, 0.04))
 
 
