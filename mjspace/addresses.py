@@ -60,8 +60,9 @@ def _by_motor(model: Any, driven: Collection[str]) -> list[str]:
 
 
 def turned(model: Any) -> list[str]:
-    """Return the parts' joints that motors turn, in the order of ``ctrl``."""
-    on_joints = np.flatnonzero(model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
+    """Return the parts' joints that motors turn, in the order of ``ctrl``; no deployed boom's."""
+    plain = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE)
+    on_joints = np.flatnonzero(plain & (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)))
     names = [model.joint(model.actuator_trnid[i, 0]).name for i in on_joints]
     return [name for name in names if not re.fullmatch(r"wheel_\d+", name)]
 

@@ -39,7 +39,8 @@ def compose(table: PlantTable) -> Any:
     spec = _load(table.model)
     for index in range(len(table.wheels.axes)):
         _attach_wheel(spec, table, index)
-    for name, part in table.parts.items():
+    # Booms last: their motors, which no actuator drives, must not come between the others.
+    for name, part in sorted(table.parts.items(), key=lambda item: item[1].deployment is not None):
         _attach_part(spec, name, part)
     for name, hinge in table.hinges.items():
         _bear(_hinge(spec, name), hinge)

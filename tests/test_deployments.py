@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mjspace import attitude
+from mjspace import addresses, attitude, plant
 from mjspace.assembly import assemble
 from mjspace.contract import Array
 from mjspace.deployment_tables import Deployment
@@ -19,6 +19,7 @@ from mjspace.log_reader import Log
 from mjspace.replay import verify
 from mjspace.simulation import fly
 from mjspace.start import first_start
+from mjspace.tables import Part, PlantTable, Rates, Wheels
 
 RATE = 2.0 * np.pi / 5600.0  # rad/s, of the orbit
 REDUCED = 2.0 * 100.0 / 102.0  # kg, of the tip against the bus
@@ -72,6 +73,16 @@ AT_ONCE = [
     "plant.parts.east.deployment.at=0",
     "plant.parts.west.deployment.at=0",
 ]
+
+
+def test_a_booms_motor_is_nobody_elses() -> None:
+    boom = Part(part="boom", deployment=Deployment(at=1.0, length=2.0, rate=0.1))
+    parts = {"boom": boom, "cmg": Part(part="dgvscmg")}
+    table = PlantTable(model="satellite_dgvscmg", wheels=Wheels(axes=[]), parts=parts)
+    model = plant.build(table, Rates(physics=1e-4), userdata=0).model
+    motors = [model.actuator(i).name for i in range(model.nu)]
+    assert motors == [*addresses.turned(model), "boom_drive"]
+    assert len(motors) == 4
 
 
 def despun(overrides: list[str], out: Path) -> Log:
