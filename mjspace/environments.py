@@ -142,6 +142,8 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
         wheels = assembly.actuators.kinds[0]
         if not isinstance(wheels, ReactionWheels) or len(assembly.actuators.kinds) > 1:
             raise InputError("plant: an environment's action is a torque for reaction wheels")
+        if scenario.faults or assembly.deployed is not None:
+            raise InputError("faults and deployments: an environment has none")
         self._wheels, self._inertia = wheels, assembly.vehicle.inertia
         self._control, self._last = scenario.rates.control, last_period(scenario)
         self._bounds = [

@@ -52,7 +52,11 @@ def wind(time, truth):
 
 
 def wheeled(name: str) -> bool:
-    return bool(load(name)[0].plant.wheels.axes)
+    scenario, _ = load(name)
+    plant = scenario.plant
+    others = plant.rcs or plant.magnetorquers or plant.ideal_thrusters
+    deployed = any(part.deployment for part in plant.parts.values())
+    return bool(plant.wheels.axes) and not (others or deployed or scenario.faults)
 
 
 class _Conformance(test_utils.EnvironmentTestMixin):
@@ -99,6 +103,12 @@ def test_every_scenario_with_reaction_wheels_is_an_environment(scenario: str) ->
     step = environment.step(np.zeros(3))
     assert step.mid()
     assert 0.0 < step.reward <= 1.0
+
+
+@pytest.mark.parametrize("scenario", ["wheel-failure", "mission"])
+def test_what_goes_wrong_or_out_makes_no_environment(scenario: str) -> None:
+    with pytest.raises(InputError, match="faults and deployments: an environment has none"):
+        environments.load(scenario)
 
 
 @pytest.mark.parametrize("scenario", ["dgvscmg-tracking", "pd-plus"])
