@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FENCE = re.compile(r"^```(\w+)(?: file=(\S+))?\n(.*?)^```$", re.M | re.S)
-PAGES = ["docs/tutorial.md", "docs/rendering.md", "README.md"]
+PAGES = ["docs/tutorial.md", "docs/rendering.md", "docs/lander.md", "README.md"]
 
 
 def test_the_scenario_reference_is_what_the_model_says() -> None:
