@@ -109,15 +109,15 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
             nearest_rows(log, "/state", "physics", times),
             nearest_rows(log, "/reference", "attitude", times),
             pulses,
-            _burning(log, scenario.plant.engine, times),
-            _how_well(log, times),
+            shares_of_thrust(log, scenario.plant.engine, times),
+            captions(log, times),
             strict=True,
         ):
             stage.set(float(time), physics, wanted, on_time, burning)
             yield overlay.write(canvas.draw(stage.scene), left, (f"{time:.2f} s", how_well))
 
 
-def _burning(log: Log, engine: Engine | None, times: Array) -> Iterator[float]:
+def shares_of_thrust(log: Log, engine: Engine | None, times: Array) -> Iterator[float]:
     """Yield the engine's share of its largest thrust: 0 where there is none."""
     if engine is None:
         yield from repeat(0.0, len(times))
@@ -126,7 +126,7 @@ def _burning(log: Log, engine: Engine | None, times: Array) -> Iterator[float]:
             yield float(thrust[0]) / engine.thrust_max
 
 
-def _how_well(log: Log, times: Array) -> Iterator[str]:
+def captions(log: Log, times: Array) -> Iterator[str]:
     """Yield what the caption says of the flight: its path where it has one, else its attitude."""
 
     def truth(field: str) -> Iterator[Array]:

@@ -13,14 +13,14 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from mjspace import attitude, overlay
+from mjspace import attitude, overlay, run
 from mjspace.environment import orbit_position
 from mjspace.errors import NoRendererError
 from mjspace.flown import scenario_of
 from mjspace.log_reader import Log
 from mjspace.offscreen import Canvas
 from mjspace.plant import from_bytes
-from mjspace.render import nearest_rows, render
+from mjspace.render import captions, nearest_rows, render, shares_of_thrust
 from mjspace.stage import Stage
 from mjspace.video import Video
 
@@ -268,3 +268,42 @@ def test_without_opengl_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(NoRendererError, match=r"apt-get install libegl1 libgl1") as caught:
         Canvas(mujoco.MjModel.from_xml_string("<mujoco/>"), (16, 16))
     assert "\n" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def descent(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    """Return the log of a lander's first half second."""
+    folder = tmp_path_factory.mktemp("descent")
+    return Log(run("lander", overrides=("duration=0.5", "checks=[]"), out=folder).path)
+
+
+def test_a_landers_caption_tells_of_its_path(descent: Log) -> None:
+    text = overlay.path_text(np.array([1.0, 2.0, 30.04]), np.array([0.3, 0.0, -0.4]), np.ones(3))
+    assert text == "height 30.0 m, speed 0.50 m/s, 1.73 m off its path"
+    times = np.array([0.0, 0.5])
+    rows = descent.read("/truth", ["position", "velocity", "position_error"])
+    fields = rows["position"], rows["velocity"], rows["position_error"]
+    wanted = [overlay.path_text(*(field[i] for field in fields)) for i in (0, -1)]
+    assert list(captions(descent, times)) == wanted
+    assert wanted[0].startswith("height 1003.8 m, speed 26.93 m/s, 0.0")
+
+
+def test_the_plume_on_stage_is_the_logged_thrust(descent: Log) -> None:
+    model = from_bytes(descent.attachment("model.mjb.gz"))
+    full, geom = model.geom("engine_plume").size[2], model.geom("engine_plume").id
+    stage = Stage(model, "chase", None)
+    (share,) = shares_of_thrust(descent, scenario_of(descent).plant.engine, np.array([0.5]))
+    assert share == pytest.approx(descent.nearest("/truth", 0.5)["thrust"].item() / 320.0)
+    assert 0.1 < share < 1.0
+    physics = descent.nearest("/state", 0.5)["physics"]
+    for burning in (share, 0.0):
+        stage.set(0.5, physics, np.array([1.0, 0.0, 0.0, 0.0]), burning=burning)
+        drawn = [
+            shape
+            for shape in stage.scene.geoms[: stage.scene.ngeom]
+            if shape.objtype == mujoco.mjtObj.mjOBJ_GEOM and shape.objid == geom
+        ]
+        assert len(drawn) == (burning > 0.0)
+        for shape in drawn:
+            assert shape.size[2] == pytest.approx(burning * full)
+            assert shape.category == mujoco.mjtCatBit.mjCAT_DECOR  # throws no shadow
