@@ -18,7 +18,7 @@ from mjspace.start import Start, first_start
 from mjspace.terminal import progress_bar
 
 FIELDS = ("body_mass", "body_ipos", "body_inertia", "body_iquat")
-# Ten times as quick as RK4 at 2 ms, and lands alike (tests/test_lander.py): 8 mm/s, 0.9 mm.
+# Ten times as quick as RK4 at 2 ms, and lands alike (tests/test_lander_flight.py): 8 mm/s, 0.9 mm.
 RATES = ["rates.physics='5 ms'", "rates.integrator=implicitfast"]
 LANDED = {"speed": 1.0, "tilt": np.radians(3.0)}  # m/s, rad
 
