@@ -13,8 +13,8 @@ from mjspace.loading import load, scenario_names
 
 pytestmark = pytest.mark.filterwarnings("ignore::mjspace.plant.UnphysicalInertiaWarning")
 
-LONG = 250_000  # integration steps: half a minute
-FLAGSHIPS = {"dgvscmg-tracking"}  # flown whole however long
+LONG = 100_000  # integration steps: a quarter of a minute, on a busy machine half of one
+FLAGSHIPS = {"dgvscmg-tracking", "lander"}  # flown whole however long
 
 
 def is_long(name: str) -> bool:
