@@ -21,6 +21,7 @@ from mjspace.scenario import Component, Scenario
 from mjspace.simulation import fly
 from mjspace.start import Start
 from mjspace.tape import one_vehicle
+from mjspace.user_code import reference_at
 
 SOURCES = ("law", "reference", "disturbance")
 
@@ -155,7 +156,7 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     law_state: Any = None
     if not fresh_law:
         seen = log.read("/measurement", None, *near)
-        wanted = assembly.reference.at(np.array([number * period]))
+        wanted = reference_at(assembly.reference, np.array([number * period]))
         template = assembly.law.reset(
             Measurement(**{n: seen.get(n, np.zeros((1, 0))) for n in Measurement._fields}),
             type(wanted)(*(values[0] for values in wanted)),

@@ -155,10 +155,6 @@ class Law:
             return None, Signals(time), Signals(time)
         if self.trouble == "two":
             return None, Command(np.zeros(2)), Signals(time)
-        if self.trouble == "plain":
-            return None, Command(torque), [time]
-        if self.trouble == "shape":
-            return None, Command(torque), Signals(np.zeros(1 + int(time > 0.0055)))
         if time > 0.0105 and self.trouble == "huge":
             torque[0] = 1e300
         return None, Command(torque), Signals(time)
@@ -175,7 +171,7 @@ def law(tmp_path: Path) -> Path:
     ("trouble", "message"),
     [
         ("nan", r"/command\.torque is not finite, or beyond 1e10, at t = 0\.011 s"),
-        ("raise", r"t = 0\.011 s: the law raised ZeroDivisionError"),
+        ("raise", r"t = 0\.011 s: the law raised ZeroDivisionError at law\.py:\d+: division"),
         ("huge", r"/command\.torque is not finite, or beyond 1e10, at t = 0\.011 s"),
     ],
 )
@@ -204,8 +200,6 @@ def test_trouble_ends_the_flight_and_keeps_every_good_period(
         ("at once", "t = 0 s: the law raised ZeroDivisionError"),
         ("no torque", "t = 0 s: the law's command has no torque"),
         ("two", "t = 0 s: the law's command has no torque of shape"),
-        ("plain", "named tuples of arrays of constant shape; list is not"),
-        ("shape", "named tuples of arrays of constant shape; Signals is not"),
     ],
 )
 def test_a_law_that_cannot_be_flown_is_told_so(law: Path, trouble: str, message: str) -> None:
