@@ -175,7 +175,7 @@ def replay(
     elif as_json:
         print(json.dumps({"identical": difference is None, "difference": str(difference or "")}))
     else:
-        print(difference or f"identical: every /state from t = {start:g} s to {logged.end:g} s")
+        print(difference or f"identical: every topic from t = {start:g} s to {logged.end:g} s")
     raise typer.Exit(1 if verify and difference else 0)
 
 
