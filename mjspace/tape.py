@@ -15,6 +15,8 @@ from mjspace.contract import Array, Measurement, Wanted
 Rows = dict[str, dict[str, Array]]
 Happening = tuple[float, int, str, str]
 """Time [s], vehicle, level (INFO or WARNING) and message of an event."""
+TICK = 1e-9
+"""s: what is closer than this is one instant."""
 
 
 @dataclass(frozen=True)
@@ -131,11 +133,14 @@ class Tape:
             "/law": _fields(self.signals[:n]),
             "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
         }
-        time = (self.period + np.arange(n, dtype=float)) * assembly.scenario.rates.control
+        control = assembly.scenario.rates.control
+        time = (self.period + np.arange(n, dtype=float)) * control
         events = _saturation_events(
             time, np.array(self.saturated[:n], bool), saturated_before, vehicle.motors
         )
-        events += [event for event in self.happened if event[0] <= time[-1]]
+        # Also those within the last period; a period that could not be recorded has none.
+        end = time[-1] + control - TICK
+        events += [event for event in self.happened if event[0] < end]
         return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
 
 

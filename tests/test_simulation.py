@@ -285,3 +285,36 @@ def test_against_an_independent_integration_of_the_sampled_loop(name: str) -> No
     )
     apart = rotation_angle(rows(blocks, "/truth", "attitude"), other.attitude)
     assert apart.max() < CASES[name]
+
+
+BETWEEN = ("rates.control=0.01", "plant.parts.east.deployment.at=0.1034", "duration=0.9")
+"""The weights are released, and let go, between two control instants."""
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("contraction-adaptive", ("duration=0.6", "plant.wheels.torque_limit=5")),
+        ("detumble-wheels", ("duration=1", "faults=[{motor='wheel_0', kind='dead', at=0.5}]")),
+        ("yo-yo-despin", BETWEEN),
+    ],
+)
+def test_rows_and_events_do_not_depend_on_the_blocks(
+    name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mjspace.simulation.BLOCK_SECONDS", np.inf)
+    built = assembly(name, *overrides)
+    found = {}
+    for periods in (500, 7, 1):
+        monkeypatch.setattr("mjspace.simulation.BLOCK_PERIODS", periods)
+        blocks = flown(built)
+        assert max(len(block.time) for block in blocks) <= periods
+        whole = {
+            (topic, field): rows(blocks, topic, field).tobytes()
+            for topic, fields in blocks[0].rows.items()
+            for field in fields
+        }
+        found[periods] = whole, [event for block in blocks for event in block.events]
+    assert found[500][1]
+    assert found[7] == found[500]
+    assert found[1] == found[500]
