@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mjspace import addresses, central_gravity, deployments, environment, plant
-from mjspace.actuators import Actuators, IdealThrusters, ReactionWheels
+from mjspace.actuators import Actuators, IdealThrusters
 from mjspace.combined_actuators import Together
 from mjspace.components import construct, load_object, source_of
 from mjspace.contract import Array, Law, ReferenceSource
@@ -23,6 +23,7 @@ from mjspace.magnetorquers import CoilSet
 from mjspace.motor_drives import MotorDrives
 from mjspace.one_by_one import OneByOne
 from mjspace.plant import Vehicle
+from mjspace.reaction_wheels import ReactionWheels
 from mjspace.scenario import Component, Scenario
 from mjspace.sensors import SensorSuite
 from mjspace.tables import PlantTable, Rates
@@ -185,8 +186,8 @@ def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
         kinds.append(GimballedEngine.of(vehicle, table.engine))
     others = table.ideal_thrusters or table.rcs or table.magnetorquers
     if table.wheels.axes or not (kinds or others):
-        limits = vehicle.torque_limit, vehicle.speed_limit
-        kinds.append(ReactionWheels(vehicle.wheel_axes, *limits, table.wheels.allocation))
+        alone = not (kinds or others)
+        kinds.append(ReactionWheels.of(vehicle, table.wheels.allocation, alone=alone))
     if table.ideal_thrusters:
         kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
     if table.rcs is not None:

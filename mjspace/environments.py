@@ -16,12 +16,12 @@ import numpy as np
 from dm_env.specs import BoundedArray
 
 from mjspace import attitude, dm_bridge, environment, loading
-from mjspace.actuators import ReactionWheels
 from mjspace.assembly import Assembly, assemble
 from mjspace.columns import Columns
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import InputError
 from mjspace.held_disturbance import HeldDisturbance
+from mjspace.reaction_wheels import ReactionWheels
 from mjspace.simulation import BLOCK_PERIODS
 from mjspace.start import INTEGRATION, first_start, last_period
 
@@ -183,7 +183,7 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
         """Share the torque ``action`` among the wheels, for one control period."""
         with np.errstate(all="ignore"):
             torque, _ = self._wheels.motor_torque(
-                np.asarray(action, dtype=float), physics.truth().wheel_speed
+                np.asarray(action, dtype=float), physics.truth().wheel_speed, self._control
             )
         physics.set_control(torque)
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mjspace.actuators import ReactionWheels
 from mjspace.assembly import assemble
 from mjspace.contract import Array
 from mjspace.errors import InputError
@@ -15,6 +14,7 @@ from mjspace.fault_tables import Fault
 from mjspace.faults import FaultSet
 from mjspace.flight import run
 from mjspace.loading import load
+from mjspace.reaction_wheels import ReactionWheels
 from mjspace.replay import verify
 from mjspace.simulation import fly
 from mjspace.start import first_start
