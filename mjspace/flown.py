@@ -14,4 +14,4 @@ def scenario_of(log: Log) -> Scenario:
         ValueError: the log does not hold it, or it is not valid for this version of mjspace.
     """
     table = tomllib.loads(log.attachment("scenario.toml").decode())
-    return validate(table, f"the scenario in {log.path}")
+    return validate(table, f"the scenario in {log.path}", context={"flown": True})
