@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjspace.contract import Array, Trajectory, gain
+from mjspace.contract import Array, Gains, Trajectory, gain
 
 from .bezier import curve
 from .descent import powered
@@ -35,29 +35,28 @@ PACE = 1.15
 
 
 @dataclass(frozen=True)
-class BezierDescent:
+class BezierDescent(Gains):
     """A Bezier curve to above the site, then down at its last speed, without end.
 
     By default it starts as in paper 003's table 3 and burns 5.13 kg within 70 and 270 N and 45 deg
     of tilt, where the paper's own descent needs 10.7 kg.
     """
 
-    duration: float = gain("s", default=79.346)
+    duration: float = gain("s", default=79.346, above=0.0)
     """T, of the curve."""
     points: Array = gain("m", (None, 3), default=TABLE_3)
     """Control points, (along, across, up) from the site, n + 1 rows for degree n."""
-    azimuth: float = gain("rad", default=0.6435)
+    azimuth: float = gain("rad", default=0.6435, at_least=-2.0 * np.pi, at_most=2.0 * np.pi)
     """Of ``along``, from x towards y."""
-    stance: float = gain("m", default=1.8)
+    stance: float = gain("m", default=1.8, at_least=0.0)
     """Of the vehicle's origin above the ground when it stands."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12)
+    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
     """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6)
+    moon_radius: float = gain("m", default=1.738e6, above=0.0)
     """Of the landing plane, tangent there."""
 
     def __post_init__(self) -> None:
-        if not self.duration > 0.0:
-            raise ValueError(f"duration is {self.duration:g} s: more than zero would do")
+        super().__post_init__()
         if len(self.points) < 5:
             raise ValueError(f"points has {len(self.points)} rows: 5 or more would do")
 

@@ -18,9 +18,9 @@ class Table:
     quaternions, each with the sign nearer to the one before it, normalized: its path never jumps.
     """
 
-    time: Array = gain("s", (None,))
+    time: Array = gain("s", ("row",), form="increasing")
     """Increasing."""
-    attitude: Array = gain(shape=(None, 4))
+    attitude: Array = gain(shape=("row", 4), form="quaternion")
     """Quaternion at each time, scalar first, body to inertial; normalized, of either sign."""
 
     def __post_init__(self) -> None:

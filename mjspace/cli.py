@@ -99,7 +99,7 @@ def run(
     from mjspace.loading import load
 
     extra = [] if seed is None else [f"seed={seed}"]
-    extra += [f"duration={duration!r}"] if duration else []
+    extra += [f"duration={duration}"] if duration else []
     if every == bool(scenario):
         raise InputError("run: give one SCENARIO, or --all; 'mjspace list' shows them")
     if every:

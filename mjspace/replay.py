@@ -126,12 +126,22 @@ def assembly_of(
     if law is not None:
         scenario = _without_signals_of_the_law(scenario).model_copy(update={"law": law})
     with tempfile.TemporaryDirectory() as own:
-        for role in SOURCES:
-            if f"{role}.py" in log.attachments:
-                (Path(own) / f"{role}.py").write_bytes(log.attachment(f"{role}.py"))
+        _unpack(log, Path(own))
         assembly = assemble(scenario, Path(own), law_folder=None if law is None else folder)
         model = plant.from_bytes(log.attachment("model.mjb.gz"))
         yield dataclasses.replace(assembly, vehicle=plant.on_model(assembly.vehicle, model))
+
+
+def _unpack(log: Log, own: Path) -> None:
+    """Write the files of one's own that the log holds, ``law.py`` or ``law/helpers.py``."""
+    for name in log.attachments:
+        if name.partition("/")[0].removesuffix(".py") not in SOURCES:
+            continue
+        file = own / name
+        if not file.resolve().is_relative_to(own.resolve()):
+            raise InputError(f"log: the attachment {name!r} leads out of its folder")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(log.attachment(name))
 
 
 def _without_signals_of_the_law(scenario: Scenario) -> Scenario:

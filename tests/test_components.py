@@ -65,8 +65,8 @@ def test_facts_fill_what_the_table_leaves_out_and_the_table_wins() -> None:
     ("kind", "gains", "message"),
     [
         ("contraction:Ideal", {"rate_gian": 1}, r"rate_gian.*did you mean 'rate_gain'"),
-        ("contraction:Ideal", {"inertia": [1, 2, 3]}, r"inertia: got .*\(3,\), wanted 3 x 3"),
-        ("contraction:Ideal", {"rate_gain": [1, 2]}, r"rate_gain: got .* wanted one number"),
+        ("contraction:Ideal", {"inertia": [1, 2, 3]}, r"inertia: got .*\(3,\), should be 3 x 3"),
+        ("contraction:Ideal", {"rate_gain": [1, 2]}, r"rate_gain: got .* should be one number"),
         ("contraction:Ideal", {"rate_gain": "3 kg"}, r"rate_gain.*unit 'kg'"),
         ("references:Hold", {"file": "none.csv"}, r"none\.csv"),
         ("contraction:Idael", {}, r"no 'Idael'.*Ideal"),

@@ -101,7 +101,10 @@ def test_several_faults_act_one_after_the_other_on_any_kind_of_actuator() -> Non
         ("{motor='wheel_0',kind='dead'}", "at and when: give one of them"),
         ("{motor='wheel_0',kind='dead',at=3,until=2}", "until 2 s is not after at 3 s"),
         ("{motor='wheel_0',kind='noisy',value=-1,at=0}", "more than 0"),
-        ("{motor='wheel_0',kind='delayed',value='7 ms',at=0}", "faults.0.value 0.007 s is no whol"),
+        (
+            "{motor='wheel_0',kind='delayed',value='7 ms',at=0}",
+            "faults.0.value: 0.007 s is not a whole",
+        ),
     ],
 )
 def test_a_fault_that_cannot_be_is_refused_in_one_line(table: str, message: str) -> None:

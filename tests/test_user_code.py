@@ -249,10 +249,13 @@ def test_a_batched_law_without_a_vehicle_axis_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("code", "message"),
     [
-        ("del Law.reset", "law: own.py:Law has no method 'reset'"),
-        ("", "law: own.py:Law has no method 'step'"),
-        (law(GOOD) + "del Source.at", "reference: own.py:Source has no method 'at'"),
-        (law(GOOD) + "push = 3", "environment.python: own.py:push is an int, not a function"),
+        ("del Law.reset", r"law: own\.py:Law has no method reset\(measurement, reference\)"),
+        ("", r"law: own\.py:Law has no method step\(state, time,"),
+        (law(GOOD) + "del Source.at", r"reference: own\.py:Source has no method at\(time\)"),
+        (
+            law(GOOD) + "push = 3",
+            r"environment\.python: own\.py:push is not a function of \(time, truth\): int",
+        ),
     ],
 )
 def test_what_lacks_a_method_is_refused_before_the_flight(
