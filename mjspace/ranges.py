@@ -47,7 +47,9 @@ class Range:
         words |= {"less than {:.6g}": self.below, "{:.6g} or less": self.at_most}
         ends = [w.format(v) for w, v in words.items() if v is not None and np.isfinite(v)]
         ends = ["a whole number"] * self.whole + ends
-        return "should be " + ("finite" if np.isinf(value) or not ends else " and ".join(ends))
+        if not np.isfinite(value):
+            return "should be a number" if np.isnan(value) else "should be finite"
+        return "should be " + " and ".join(ends)
 
     def __str__(self) -> str:
         """Return the range as a person reads it, ``>= 0, < 1``; empty where it has no end."""
@@ -122,9 +124,8 @@ def _refuse_values(name: str, array: _Array, metadata: Mapping[str, Any]) -> Non
     unit = f" {metadata['unit']}" if metadata["unit"] else ""
     for index in map(tuple, np.argwhere(~metadata["range"].admits(array))):
         place, wrong = "".join(f"[{i}]" for i in index), array[index]
-        raise ValueError(
-            f"{name}{place}: got {array[index]:g}{unit}, {metadata['range'].demand(array[index])}"
-        )
+        demand = metadata["range"].demand(wrong)
+        raise ValueError(f"{name}{place}: got {wrong:g}{unit}, {demand}")
     if metadata["form"] and (complaint := FORMS[metadata["form"]](array)):
         raise ValueError(f"{name}: {complaint}")
 
