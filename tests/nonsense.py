@@ -30,7 +30,7 @@ FACTS: dict[str, Any] = {
     "inertia": np.diag([10.0, 11.0, 12.0]),
     "wheel_axes": np.eye(3),
     "wheel_inertia": np.full(3, 0.1),
-    "control_period": 1e-3,
+    "control_period": 1e-4,
     "inner_period": 1e-4,
     "gimbal_axes": np.eye(3),
     "spin_axes": np.roll(np.eye(3), 1, axis=0),
