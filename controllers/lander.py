@@ -78,7 +78,7 @@ class VariableStructure(Gains):
     """m, at the start."""
     tank: float = gain("kg", default=0.0, at_least=0.0)
     """Propellant at the start: what its gauge shows to be gone makes m less. 0: m stays."""
-    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0), at_least=0.0)
+    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0), at_least=0.0, at_most=np.inf)
     """Least, without which no torque is left, and largest."""
     gimbal_limit: float = gain("rad", default=np.radians(20.0), above=0.0, at_most=np.pi)
     """Of either angle."""
@@ -94,7 +94,7 @@ class VariableStructure(Gains):
             raise ValueError(f"coordinates: got {self.coordinates!r}, should be one of {have}")
         if not np.all(self.surface_gain):
             raise ValueError(f"surface_gain: got {self.surface_gain}, none of it may be zero")
-        if not self.thrust_range[0] <= self.thrust_range[1]:
+        if not (np.inf > self.thrust_range[0] <= self.thrust_range[1]):
             raise ValueError(
                 f"thrust_range: got {self.thrust_range} N, should be the least, then the largest"
             )

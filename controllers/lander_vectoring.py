@@ -80,7 +80,7 @@ class ThrustVectoring(Gains):
     """J, about the centre of mass, body axes."""
     lever: float = gain("m", default=1.0, above=0.0)
     """How far the gimbals are below the centre of mass."""
-    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0), above=0.0)
+    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0), above=0.0, at_most=np.inf)
     """Least, without which no torque is left, and largest."""
     gimbal_limit: float = gain("rad", default=np.radians(20.0), above=0.0, at_most=np.pi)
     """Of either angle."""
@@ -91,7 +91,7 @@ class ThrustVectoring(Gains):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.thrust_range[0] <= self.thrust_range[1]:
+        if not (np.inf > self.thrust_range[0] <= self.thrust_range[1]):
             raise ValueError(
                 f"thrust_range: got {self.thrust_range} N, should be the least, then the largest"
             )

@@ -25,36 +25,40 @@ class Range:
     whole: bool = False
     """Whether only whole numbers are admitted."""
 
-    def complaint(self, value: float) -> str:
-        """Return what ``value`` should be; empty where it is inside."""
-        if not self.admits_infinity(value) and not np.isfinite(value):
-            return "should be finite"
-        if self.above is not None and not value > self.above:
-            return f"should be greater than {self.above:g}"
-        if self.at_least is not None and not value >= self.at_least:
-            return f"should be {self.at_least:g} or more"
-        if self.below is not None and not value < self.below:
-            return f"should be less than {self.below:g}"
-        if self.at_most is not None and not value <= self.at_most:
-            return f"should be {self.at_most:g} or less"
-        if self.whole and value != np.rint(value):
-            return "should be a whole number"
-        return ""
+    def admits(self, value: _Array) -> NDArray[np.bool_]:
+        """Return whether each number is inside."""
+        inside = np.isfinite(value)
+        for limit in (self.at_least, self.at_most):
+            if limit is not None and np.isinf(limit):
+                inside |= value == limit
+        if self.above is not None:
+            inside &= value > self.above
+        if self.at_least is not None:
+            inside &= value >= self.at_least
+        if self.below is not None:
+            inside &= value < self.below
+        if self.at_most is not None:
+            inside &= value <= self.at_most
+        return inside & (value == np.rint(value)) if self.whole else inside
 
-    def admits_infinity(self, value: float) -> bool:
-        """Return whether ``value`` is an infinity that the range includes."""
-        return value in (self.at_least, self.at_most) and bool(np.isinf(value))
+    def demand(self, value: float) -> str:
+        """Return in words what ``value``, which is outside, should be."""
+        words = {"greater than {:.6g}": self.above, "{:.6g} or more": self.at_least}
+        words |= {"less than {:.6g}": self.below, "{:.6g} or less": self.at_most}
+        ends = [w.format(v) for w, v in words.items() if v is not None and np.isfinite(v)]
+        ends = ["a whole number"] * self.whole + ends
+        if not np.isfinite(value):
+            return "should be a number" if np.isnan(value) else "should be finite"
+        return "should be " + " and ".join(ends)
 
     def __str__(self) -> str:
-        """Return the range as a person reads it: ``> 0``, ``0 to 1``; empty where it has no end."""
-        limit = self.at_most == np.inf
-        low = "" if self.above is None else f"> {self.above:.4g}"
-        low = low if self.at_least is None else f">= {self.at_least:.4g}"
-        high = "" if self.below is None else f"< {self.below:.4g}"
-        high = high if self.at_most is None or limit else f"<= {self.at_most:.4g}"
-        words = [word for word in (low, high) if word]
-        text = ", ".join((["whole"] if self.whole else []) + words)
-        return f"{text} or inf".lstrip() if limit else text
+        """Return the range as a person reads it, ``>= 0, < 1``; empty where it has no end."""
+        ends = {">": self.above, ">=": self.at_least, "<": self.below, "<=": self.at_most}
+        words = [f"{s} {v:.4g}" for s, v in ends.items() if v is not None and np.isfinite(v)]
+        infinite = [
+            f"or {v}" for v in (self.at_least, self.at_most) if v is not None and np.isinf(v)
+        ]
+        return " ".join([", ".join(["whole"] * self.whole + words), *infinite]).strip()
 
 
 def numbers(value: Any) -> _Array:
@@ -118,10 +122,10 @@ def _refuse_shape(name: str, array: _Array, shape: tuple[int | str | None, ...])
 
 def _refuse_values(name: str, array: _Array, metadata: Mapping[str, Any]) -> None:
     unit = f" {metadata['unit']}" if metadata["unit"] else ""
-    for index, value in np.ndenumerate(array):
-        if complaint := metadata["range"].complaint(value):
-            place = "".join(f"[{i}]" for i in index)
-            raise ValueError(f"{name}{place}: got {value:g}{unit}, {complaint}")
+    for index in map(tuple, np.argwhere(~metadata["range"].admits(array))):
+        place, wrong = "".join(f"[{i}]" for i in index), array[index]
+        demand = metadata["range"].demand(wrong)
+        raise ValueError(f"{name}{place}: got {wrong:g}{unit}, {demand}")
     if metadata["form"] and (complaint := FORMS[metadata["form"]](array)):
         raise ValueError(f"{name}: {complaint}")
 

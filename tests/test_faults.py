@@ -103,7 +103,7 @@ def test_several_faults_act_one_after_the_other_on_any_kind_of_actuator() -> Non
         ("{motor='wheel_0',kind='noisy',value=-1,at=0}", "more than 0"),
         (
             "{motor='wheel_0',kind='delayed',value='7 ms',at=0}",
-            "faults.0.value: 0.007 s is not a whole",
+            "faults.0.value: 0.007 s is not",
         ),
     ],
 )

@@ -18,6 +18,7 @@ TESTBED = [path for path in MODULES if path not in LAWS]
 A_LAW_MAY_IMPORT = (
     *("numpy", "scipy", "numba", "mjspace.attitude", "mjspace.contract", "mjspace.controllers"),
     *("abc", "collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"),
+    "warnings",
 )
 # These packages are known to no other module of the testbed.
 ONLY_IN = {

@@ -341,7 +341,7 @@ def test_any_number_of_wheels_is_read(wheels: int) -> None:
     [
         (
             {"rate": {"period": 2.5e-3}},
-            r"sensors\.rate\.period: 0\.0025 s .* 0\.001 s: .* 0\.002 s and 0\.003 s",
+            r"sensors\.rate\.period: 0\.0025 s .* 0\.002 s and 0\.003 s",
         ),
         (
             {"rate": {"period": 2e-3, "delay": 5e-3}},

@@ -113,8 +113,8 @@ def test_bezier_starts_as_table_3_upright_and_ends_descending() -> None:
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: SineDescent(duration=0.0), "duration is 0 s"),
-        (lambda: BezierDescent(duration=-1.0), "duration is -1 s"),
+        (lambda: SineDescent(duration=0.0), "duration: got 0 s"),
+        (lambda: BezierDescent(duration=-1.0), "duration: got -1 s"),
         (lambda: BezierDescent(points=np.zeros((4, 3))), "4 rows: 5 or more"),
     ],
 )
