@@ -1,11 +1,13 @@
 """Flying again from a log alone: to prove it bit for bit, or to see what another law would do."""
 
 import dataclasses
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -187,3 +189,16 @@ def _first_difference(logged: dict[str, Any], flown: dict[str, Any]) -> Differen
         float(logged[name].reshape(n, -1)[k, i]),
         float(flown[name][:n].reshape(n, -1)[k, i]),
     )
+
+
+class _Callable(ModuleType):
+    """This module, once imported, is what ``mjspace.replay`` names: it flies as the function does.
+
+    A package's attribute is the submodule of that name, whatever the package defines itself.
+    """
+
+    def __call__(self, *arguments: Any, **options: Any) -> Result:
+        return replay(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _Callable
