@@ -28,6 +28,9 @@ from mjspace.sensors import SensorSuite
 from mjspace.tables import PlantTable, Rates
 from mjspace.thrusters import Thrusters
 
+METHODS = {"law": ("reset", "step"), "reference": ("at",)}
+CONTRACT = "the tutorial says what it must have"
+
 
 @dataclass(frozen=True)
 class Assembly:
@@ -123,7 +126,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
     disturbance = None
     kind = scenario.environment.python
     if kind is not None:
-        disturbance = _part("environment.python", load_object, kind, folder)
+        disturbance = _part("environment.python", _function, kind, folder)
         sources["disturbance"] = source_of(disturbance)
         flown["environment"] = scenario.environment.model_copy(
             update={"python": _in_log("disturbance", kind)}
@@ -164,8 +167,19 @@ def _component(
     with blamed_on(role):
         kind = load_object(component.kind, folder)
         built, flown = construct(component, kind, facts, folder)
+        for method in METHODS[role]:
+            if not callable(getattr(built, method, None)):
+                raise ValueError(f"{component.kind} has no method {method!r}: {CONTRACT}")
     flown = flown.model_copy(update={"kind": _in_log(role, component.kind)})
     return built, flown, source_of(kind)
+
+
+def _function(kind: str, folder: Path) -> Callable[..., Any]:
+    """Return the function that ``kind`` names; ValueError for anything else."""
+    found = load_object(kind, folder)
+    if not callable(found):
+        raise ValueError(f"{kind} is an {type(found).__name__}, not a function: {CONTRACT}")
+    return found  # type: ignore[no-any-return]
 
 
 def _in_log(role: str, kind: str) -> str:

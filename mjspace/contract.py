@@ -53,6 +53,34 @@ class Measurement(NamedTuple):
     """Of the Earth, body axes [T], shape (..., 3)."""
 
 
+class Truth(NamedTuple):
+    """The true state and surroundings at an instant, as a disturbance in Python receives them.
+
+    Fields that ``Measurement`` has too are described there. They do not depend on the vehicle's
+    sensors; what a vehicle or its environment lacks is of shape ``(0,)``.
+    """
+
+    attitude: Array
+    rate: Array
+    wheel_speed: Array
+    gimbal_angle: Array
+    gimbal_rate: Array
+    current: Array
+    position: Array
+    velocity: Array
+    altitude: Array
+    ground_velocity: Array
+    thrust: Array
+    propellant: Array
+    contact: Array
+    wheel_angle: Array
+    magnetic_field: Array
+    orbit_position: Array
+    """Of the frame's origin from the planet's centre, inertial axes [m], shape (3,)."""
+    orbit_velocity: Array
+    """Of the frame's origin, inertial axes [m/s], shape (3,)."""
+
+
 class Reference(NamedTuple):
     """The wanted motion at a control instant, the same for every vehicle of a batch."""
 

@@ -73,3 +73,16 @@ def position(orbit: Any, time: float) -> tuple[float, float, float]:
         along * orbit[5] + across * orbit[8],
         along * orbit[6] + across * orbit[9],
     )
+
+
+@njit(cache=True, error_model="numpy")
+def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
+    """Return the velocity [m/s], inertial axes, at ``time`` [s]; ``orbit`` as for ``position``."""
+    anomaly = eccentric_anomaly(orbit[2] + orbit[1] * time, orbit[3])
+    rate = orbit[1] / (1.0 - orbit[3] * math.cos(anomaly))
+    along, across = -rate * math.sin(anomaly), rate * math.cos(anomaly)
+    return (
+        along * orbit[4] + across * orbit[7],
+        along * orbit[5] + across * orbit[8],
+        along * orbit[6] + across * orbit[9],
+    )

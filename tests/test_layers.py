@@ -78,7 +78,7 @@ def test_module_says_what_it_is_for_and_is_short(path: Path) -> None:
     text = path.read_text()
     summary = (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
     assert summary.endswith((".", "?"))
-    assert len(text.splitlines()) <= 250  # STYLE: split at 250
+    assert len(text.splitlines()) <= 350  # longer ones have a second subject
 
 
 def test_no_module_hides_a_mapped_package() -> None:
