@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from mjspace.scenario import Check, Event
 Topics = Mapping[str, Mapping[str, tuple[int, ...]]]
 """The shape of each field of each topic."""
 
+Outcome = Literal["PASS", "FAIL", "not measured"]
+
 TICK = 1e-9
 """s: what the log's stamps can tell apart."""
 
@@ -26,11 +29,21 @@ class Verdict:
 
     check: Check
     measured: float
+    """nan where there is nothing to judge."""
+    missing: str = ""
+    """Why there is nothing to judge."""
 
     @property
-    def passed(self) -> bool:
-        """Whether the measured value keeps its bounds; a value that is no number never does."""
-        return bool(self.check.admits(self.measured))
+    def outcome(self) -> Outcome:
+        """PASS if the measured value is within its bounds; neither if nothing was measured."""
+        if math.isnan(self.measured):
+            return "not measured"
+        return "PASS" if self.check.admits(self.measured) else "FAIL"
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether it came out as the scenario expects; what was not measured never does."""
+        return self.outcome == self.check.expected
 
     @property
     def bound(self) -> str:
@@ -45,8 +58,13 @@ class Verdict:
     @property
     def line(self) -> str:
         """The verdict in one line."""
-        word = "PASS" if self.passed else "FAIL"
-        return f"{word} {self.check.name}: {self.measured:.6g} (wanted {self.bound})"
+        if self.missing:
+            return f"{self.outcome} {self.check.name}: {self.missing}"
+        line = f"{self.outcome} {self.check.name}: {self.measured:.6g} (required {self.bound})"
+        if self.check.expected == "PASS":
+            return line
+        how = "as expected" if self.as_expected else "expected to FAIL"
+        return f"{line}, {how}: {self.check.because}"
 
 
 def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
@@ -67,7 +85,7 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
 def judge(log: Log, checks: Sequence[Check], events: Sequence[Event] = ()) -> list[Verdict]:
     """Return the verdict of each check, from the log alone, one chunk of it in memory at a time.
 
-    ``events`` are the scenario's, which checks may count from; one that has not happened leaves
+    ``events`` are the scenario's, which checks may count from; one that never happened leaves
     nothing to measure.
 
     Raises:
@@ -75,7 +93,7 @@ def judge(log: Log, checks: Sequence[Check], events: Sequence[Event] = ()) -> li
     """
     named = [name for check in checks for name in (check.since, check.until) if name]
     happened = {event.name: _first(log, event) for event in events if event.name in named}
-    return [Verdict(check, _measure(log, check, *_window(check, happened))) for check in checks]
+    return [_verdict(log, check, happened) for check in checks]
 
 
 def find_signal(topics: Topics, signal: str) -> tuple[str, str, slice]:
@@ -120,18 +138,30 @@ def _first(log: Log, event: Event) -> float:
     return math.nan
 
 
+def _verdict(log: Log, check: Check, happened: Mapping[str, float]) -> Verdict:
+    never = [name for name in (check.since, check.until) if name and math.isnan(happened[name])]
+    if never:
+        return Verdict(check, math.nan, f"event {never[0]!r} never happened")
+    start, end = _window(check, happened)
+    count, measured = _measure(log, check, start, end)
+    if count == 0:
+        until = "the end" if end == math.inf else f"{end:.6g} s"
+        return Verdict(check, math.nan, f"no sample from {start:.6g} s to {until}")
+    return Verdict(
+        check, measured, f"{check.signal} is not a number" if math.isnan(measured) else ""
+    )
+
+
 def _window(check: Check, happened: Mapping[str, float]) -> tuple[float, float]:
     """Return the check's first and last instant [s]."""
     zero = happened[check.since] if check.since else 0.0
     end = math.inf if check.end is None else zero + check.end
     before = happened[check.until] - TICK if check.until else math.inf
-    # min and max would pass by what has not happened
-    return zero + check.start, float(np.minimum(end, before))
+    return zero + check.start, min(end, before)
 
 
-def _measure(log: Log, check: Check, start: float, end: float) -> float:
-    if math.isnan(start) or math.isnan(end):
-        return math.nan
+def _measure(log: Log, check: Check, start: float, end: float) -> tuple[int, float]:
+    """Return how many samples the window has, and their statistic."""
     topic, field, part = find_signal(log.topics, check.signal)
     target = None if check.target is None else np.asarray(check.target, dtype=float)
     count, total, peak, least, last = 0, 0.0, -np.inf, np.inf, np.nan
@@ -156,7 +186,7 @@ def _measure(log: Log, check: Check, start: float, end: float) -> float:
             float(values[-1]),
         )
     if count == 0:
-        return float("nan")
+        return 0, math.nan
     scale = float(np.linalg.norm(target)) if check.relative and target is not None else 1.0
     measured = {
         "max": peak,
@@ -167,4 +197,4 @@ def _measure(log: Log, check: Check, start: float, end: float) -> float:
         "rms": math.sqrt(abs(total / count)),  # squares are summed only where it is asked for
         "final": last,
     }[check.statistic]
-    return measured / scale
+    return count, measured / scale

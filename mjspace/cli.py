@@ -1,7 +1,8 @@
 """The command line: ``mjspace list | info | run | replay | render | plot | validate``.
 
-Exit status: 0 all is well, 1 flown but a check failed (or a replay differed, or the flight ended
-early), 2 bad input. Modules are imported when a command needs them: ``--help`` answers at once.
+Exit status: 0 every check came out as the scenario expects, 1 flown but one did not (or a replay
+differed, or the flight ended early), 2 bad input. Modules are imported when a command needs them:
+``--help`` answers at once.
 """
 
 import json
@@ -125,7 +126,7 @@ def _run_all(overrides: list[str], out: Path, as_json: bool) -> NoReturn:
     else:
         every.show(outcomes)
         print(f"logs   {out}")
-    raise typer.Exit(0 if all(outcome.is_right for outcome in outcomes) else 1)
+    raise typer.Exit(0 if all(outcome.result["passed"] for outcome in outcomes) else 1)
 
 
 @app.command()

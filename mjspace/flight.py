@@ -37,8 +37,8 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """Whether it reached its end and kept every check."""
-        return not self.trouble and all(verdict.passed for verdict in self.verdicts)
+        """Whether it reached its end and every check came out as expected."""
+        return not self.trouble and all(verdict.as_expected for verdict in self.verdicts)
 
     @property
     def log(self) -> Log:
@@ -111,5 +111,5 @@ def fly_to_log(
             recorder.flush()
             verdicts = judge(Log(path), assembly.scenario.checks, assembly.scenario.events)
             for verdict in verdicts:
-                recorder.event("INFO" if verdict.passed else "ERROR", verdict.line)
+                recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
     return Result(path, verdicts, trouble, stop.signal, ended_by)

@@ -14,4 +14,5 @@ def scenario_of(log: Log) -> Scenario:
         ValueError: the log does not hold it, or it is not valid for this version of mjspace.
     """
     table = tomllib.loads(log.attachment("scenario.toml").decode())
+    table.pop("verdict", None)  # of logs from before checks said how they are expected to come out
     return validate(table, f"the scenario in {log.path}")

@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from mjspace.checks import Verdict
 from mjspace.flight import Result
 from mjspace.log_reader import Log
 
@@ -17,16 +18,33 @@ def print_result(result: Result) -> None:
         table = Table(box=None, pad_edge=False, header_style="bold")
         table.add_column("check")
         table.add_column("measured", justify="right")
-        table.add_column("wanted")
+        table.add_column("required")
         table.add_column("verdict")
         for verdict in result.verdicts:
-            word = "[green]PASS[/]" if verdict.passed else "[bold red]FAIL[/]"
             table.add_row(
-                escape(verdict.check.name), f"{verdict.measured:.4g}", verdict.bound, word
+                escape(verdict.check.name),
+                "-" if verdict.missing else f"{verdict.measured:.4g}",
+                verdict.bound,
+                _word(verdict),
             )
         console.print(table)
+        for verdict in result.verdicts:
+            if verdict.missing or verdict.check.because:
+                console.print(verdict.line, style=_style(verdict), markup=False, highlight=False)
     if result.trouble:
         console.print(f"[bold red]ended early:[/] {escape(result.trouble)}", highlight=False)
+
+
+def _word(verdict: Verdict) -> str:
+    expected = verdict.check.expected
+    note = ""
+    if expected == "FAIL":
+        note = " as expected" if verdict.as_expected else f", expected {expected}"
+    return f"[{_style(verdict)}]{verdict.outcome}{note}[/]"
+
+
+def _style(verdict: Verdict) -> str:
+    return "green" if verdict.as_expected else "bold red"
 
 
 def result_data(result: Result) -> dict[str, Any]:
@@ -40,10 +58,14 @@ def result_data(result: Result) -> dict[str, Any]:
                 "name": verdict.check.name,
                 "signal": verdict.check.signal,
                 "statistic": verdict.check.statistic,
-                "measured": verdict.measured,
+                "measured": None if verdict.missing else verdict.measured,
                 "below": verdict.check.below,
                 "above": verdict.check.above,
-                "passed": verdict.passed,
+                "verdict": verdict.outcome,
+                "expected": verdict.check.expected,
+                "as_expected": verdict.as_expected,
+                "because": verdict.check.because,
+                "missing": verdict.missing,
             }
             for verdict in result.verdicts
         ],

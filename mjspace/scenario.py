@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from mjspace.environment_tables import Environment
 from mjspace.fault_tables import Fault
@@ -61,6 +61,39 @@ class Check(Watched):
     """Taken from the signal first, so that the statistic is of an error."""
     relative: bool = False
     """The error is divided by the norm of ``target``."""
+    expected: Literal["PASS", "FAIL"] = "PASS"
+    """How the check comes out when all is well: FAIL of what the flight shows not to hold. The
+    scenario passes if it reaches its end and every check comes out as expected; a check without a
+    sample in its window comes out neither way."""
+    because: str = ""
+    """Why it fails, in one line: required with ``expected = "FAIL"``."""
+    fails_with: list[str] = []
+    """``"key=value"``, or a list of them that go together, as ``--set`` takes them: a change of the
+    scenario with which the check comes out the other way, because what it claims is gone."""
+
+    @field_validator("fails_with", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return [value] if isinstance(value, str) else value
+
+    @field_validator("fails_with")
+    @classmethod
+    def _of_the_flight(cls, value: list[str]) -> list[str]:
+        for override in value:
+            key, equals, _ = override.partition("=")
+            if not equals or not key.strip():
+                raise ValueError(f"got {override!r}, should be 'key=value'")
+            if key.strip().split(".")[0] == "checks":
+                raise ValueError(f"{override!r} changes a check, should change the flight")
+        return value
+
+    @model_validator(mode="after")
+    def _reason_for_a_failure(self) -> Self:
+        if self.expected == "FAIL" and not self.because.strip():
+            raise ValueError('expected = "FAIL" needs because = "why it fails, in one line"')
+        if self.expected == "PASS" and self.because:
+            raise ValueError('because goes with expected = "FAIL"')
+        return self
 
     @model_validator(mode="after")
     def _of_an_error(self) -> Self:
@@ -91,9 +124,17 @@ class Scenario(Table):
     law: Component
     faults: list[Fault] = []
     checks: list[Check] = []
-    verdict: Literal["PASS", "FAIL"] = "PASS"
-    """What is right: a scenario may be there to show a failure."""
     events: list[Event] = []
+
+    @model_validator(mode="before")
+    @classmethod
+    def _failures_are_named(cls, table: Any) -> Any:
+        if isinstance(table, dict) and "verdict" in table:
+            raise ValueError(
+                "verdict: a scenario names the checks that fail: in each of these [[checks]] write "
+                'expected = "FAIL" and because = "why it fails"'
+            )
+        return table
 
     @model_validator(mode="after")
     def _checks_of_events(self) -> "Scenario":

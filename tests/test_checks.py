@@ -1,9 +1,11 @@
 """Judging logs made by hand, where every statistic is known."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from mjspace.checks import judge, refuse_unknown
 from mjspace.errors import InputError
@@ -98,17 +100,81 @@ def test_target_and_relative() -> None:
 )
 def test_bounds(below: float | None, above: float | None, passed: bool) -> None:
     check = Check(name="x", signal="truth.error", below=below, above=above)
-    assert judge(Tape(ERROR, RATE), [check])[0].passed is passed
+    assert judge(Tape(ERROR, RATE), [check])[0].as_expected is passed
 
 
-def test_what_is_no_number_passes_no_check() -> None:
+FAILING = {"expected": "FAIL", "because": "it is fast"}
+
+
+@pytest.mark.parametrize("expected", [{}, FAILING], ids=["PASS", "FAIL"])
+def test_what_is_not_measured_comes_out_neither_way(expected: dict[str, str]) -> None:
     broken = ERROR.copy()
     broken[1] = np.nan
-    for statistic in ("max", "min", "peak", "mean", "rms", "drift"):
-        check = Check(name="x", signal="truth.error", statistic=statistic, below=1e9, above=-1e9)
-        assert not judge(Tape(broken, RATE), [check])[0].passed
-    empty = Check(name="x", signal="truth.error", start=9.0, below=1e9)
-    assert not judge(Tape(ERROR, RATE), [empty])[0].passed
+    late = {"start": 9.0}
+    cases: list[tuple[Any, np.ndarray, str]] = [
+        *(
+            ({"statistic": statistic}, broken, "truth.error is not a number")
+            for statistic in ("max", "min", "peak", "mean", "rms", "drift")
+        ),
+        (late, ERROR, "no sample from 9 s to the end"),
+        (late | {"end": 9.5}, ERROR, "no sample from 9 s to 9.5 s"),
+        ({"until": "small", "start": 0.3}, ERROR, "no sample from 0.3 s to 0.3 s"),
+        ({"since": "never"}, ERROR, "event 'never' never happened"),
+        ({"since": "small", "until": "never"}, ERROR, "event 'never' never happened"),
+    ]
+    for bound in ({"below": 1e9}, {"below": -1e9}):
+        for keys, signal, why in cases:
+            check = Check.model_validate(
+                {"name": "x", "signal": "truth.error"} | keys | bound | expected
+            )
+            verdict = judge(Tape(signal, RATE), [check], [SMALL, NEVER])[0]
+            assert verdict.outcome == "not measured"
+            assert not verdict.as_expected
+            assert verdict.line == f"not measured x: {why}"
+
+
+@pytest.mark.parametrize(
+    ("below", "expected", "as_expected", "line"),
+    [
+        (4.0, {}, True, "PASS x: 3 (required < 4)"),
+        (2.0, {}, False, "FAIL x: 3 (required < 2)"),
+        (2.0, FAILING, True, "FAIL x: 3 (required < 2), as expected: it is fast"),
+        (4.0, FAILING, False, "PASS x: 3 (required < 4), expected to FAIL: it is fast"),
+    ],
+)
+def test_a_check_may_be_expected_to_fail(
+    below: float, expected: dict[str, str], as_expected: bool, line: str
+) -> None:
+    check = Check.model_validate({"name": "x", "signal": "truth.error", "below": below} | expected)
+    verdict = judge(Tape(ERROR, RATE), [check])[0]
+    assert verdict.as_expected is as_expected
+    assert verdict.line == line
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"expected": "FAIL"}, "needs because"),
+        ({"expected": "FAIL", "because": " "}, "needs because"),
+        ({"because": "it is fast"}, 'goes with expected = "FAIL"'),
+        ({"expected": "fail", "because": "it is fast"}, "'PASS' or 'FAIL'"),
+        ({"fails_with": "law.rate_gain"}, "'law.rate_gain', should be 'key=value'"),
+        ({"fails_with": ["seed=1", "=2"]}, "'=2', should be 'key=value'"),
+        ({"fails_with": "checks.0.below=1"}, "should change the flight"),
+    ],
+)
+def test_an_expectation_that_says_too_little_is_refused(
+    keys: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ValidationError, match=message):
+        Check.model_validate({"name": "x", "signal": "truth.error", "below": 1.0} | keys)
+
+
+def test_what_a_check_fails_with_is_one_change_or_several() -> None:
+    check = {"name": "x", "signal": "truth.error", "below": 1.0}
+    one = Check.model_validate(check | {"fails_with": "seed=1"})
+    assert one.fails_with == ["seed=1"]
+    assert Check.model_validate(check | {"fails_with": ["a=1", "b=2"]}).fails_with == ["a=1", "b=2"]
 
 
 @pytest.mark.parametrize(
@@ -161,4 +227,4 @@ def test_windows_are_counted_from_events(window: dict[str, str], value: float) -
     )
     verdict = judge(Tape(ERROR, RATE), [check], [SMALL, LOW, NEVER])[0]
     assert verdict.measured == pytest.approx(value, nan_ok=True)
-    assert verdict.passed is not np.isnan(value)
+    assert verdict.outcome == ("not measured" if np.isnan(value) else "PASS")

@@ -7,30 +7,40 @@ import pytest
 from mjspace import every
 from mjspace.every import Outcome
 
-RIGHT = {"passed": True, "trouble": "", "log": "x", "checks": [{"name": "a", "passed": True}]}
-WRONG = RIGHT | {"passed": False, "checks": [{"name": "too fast", "passed": False}]}
+MET = {"name": "slow enough", "verdict": "PASS", "expected": "PASS", "as_expected": True}
+MISSED = {"name": "close enough", "verdict": "FAIL", "expected": "PASS", "as_expected": False}
+SHOWN = {"name": "too fast", "verdict": "FAIL", "expected": "FAIL", "as_expected": True}
+BLIND = {"name": "later", "verdict": "not measured", "expected": "FAIL", "as_expected": False}
 
 
-def outcome(name: str, wanted: str, result: dict[str, object]) -> Outcome:
-    return Outcome(name, "shows something", wanted, result, 1.25)
+def outcome(name: str, *checks: dict[str, object], trouble: str = "") -> Outcome:
+    passed = not trouble and all(check["as_expected"] for check in checks)
+    result = {"passed": passed, "trouble": trouble, "log": "x", "checks": list(checks)}
+    return Outcome(name, "shows something", result, 1.25)
 
 
-def test_a_failure_that_is_meant_is_right(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_failure_that_is_expected_is_shown_and_passes(capsys: pytest.CaptureFixture[str]) -> None:
     all_of_them = [
-        outcome("good", "PASS", RIGHT),
-        outcome("bad", "PASS", WRONG),
-        outcome("crash", "FAIL", WRONG),
-        outcome("spared", "FAIL", RIGHT),
+        outcome("good", MET),
+        outcome("bad", MET, MISSED),
+        outcome("crash", MET, SHOWN),
+        outcome("blind", SHOWN, BLIND),
+        outcome("broken", MET, trouble="the law raised"),
     ]
-    assert [one.is_right for one in all_of_them] == [True, False, True, False]
+    assert [one.verdict for one in all_of_them] == ["PASS", "FAIL", "PASS", "FAIL", "FAIL"]
     every.show(all_of_them)
     lines = capsys.readouterr().out.splitlines()
-    assert "FAIL as it should" in next(line for line in lines if line.startswith("crash"))
-    assert "bad: too fast" in lines
-    rows = every.data(all_of_them)
-    assert rows[1] == {"scenario": "bad", "verdict": "FAIL", "wanted": "PASS", "seconds": 1.25} | {
+    row = next(line for line in lines if line.startswith("crash"))
+    assert row.split()[1:6] == ["PASS", "2/2,", "1", "FAIL", "as"]
+    assert "bad: close enough: FAIL" in lines
+    assert "blind: later: not measured" in lines
+    assert "broken: the law raised" in lines
+    assert every.data(all_of_them)[1] == {
+        "scenario": "bad",
         "description": "shows something",
-        **WRONG,
+        "verdict": "FAIL",
+        "seconds": 1.25,
+        **all_of_them[1].result,
     }
 
 

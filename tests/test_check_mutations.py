@@ -1,0 +1,133 @@
+"""Every check can fail: flown with the change that it names, it comes out the other way."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mjspace.flight import run
+from mjspace.loading import load, scenario_names, to_toml
+from mjspace.scenario import Check, Scenario
+
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+LONG = 100_000  # integration steps, as in test_scenarios
+
+UNFINISHED = {
+    "b-dot",
+    "b-dot-igrf",
+    "cmg-singularity",
+    "cmg-slew",
+    "contraction-adaptive",
+    "contraction-gradient",
+    "contraction-ideal",
+    "contraction-identification",
+    "contraction-noise",
+    "contraction-regulation",
+    "desaturation-gravity-gradient",
+    "desaturation-magnetic",
+    "desaturation-thrusters",
+    "desaturation-untold",
+    "detumble-thrusters",
+    "detumble-wheels",
+    "dgvscmg-against-wheels",
+    "dgvscmg-free",
+    "dgvscmg-ideal",
+    "dgvscmg-imbalance",
+    "dgvscmg-low-momentum",
+    "dgvscmg-no-rejection",
+    "dgvscmg-sensorless",
+    "dgvscmg-singularity",
+    "dgvscmg-slow-loops",
+    "dgvscmg-thesis",
+    "dgvscmg-tracking",
+    "dgvscmg-unloading",
+    "gravity-gradient-boom",
+    "immersion-invariance",
+    "immersion-invariance-slow",
+    "lander",
+    "lander-craters",
+    "lander-cubic",
+    "lander-dispersed",
+    "lander-engine-lag",
+    "lander-engine-out",
+    "lander-estimated",
+    "lander-paper",
+    "lander-printed",
+    "lander-slope",
+    "lander-ten-hertz",
+    "lander-thrifty",
+    "lqr-gravity-gradient",
+    "lqr-regulation",
+    "lqr-tracking",
+    "lqr-tracking-printed",
+    "mission",
+    "nutation-damper",
+    "pd-plus",
+    "pd-plus-modified",
+    "pd-plus-robust",
+    "pmsm-speed",
+    "pmsm-speed-no-rejection",
+    "rcs-centre",
+    "rcs-minimum-fuel",
+    "rcs-minimum-impulse",
+    "rcs-minimum-time",
+    "rcs-one-sided",
+    "rcs-schmitt",
+    "rcs-schmitt-three-axis",
+    "rcs-sliding",
+    "rcs-three-axis",
+    "unwinding",
+    "unwinding-cured",
+    "wheel-failure",
+    "wheel-pyramid",
+    "wheel-pyramid-least-squares",
+    "wheel-stuck",
+    "yo-yo-despin",
+}
+"""Scenarios whose checks do not all say yet what they fail with."""
+
+
+def mutations(scenario: Scenario) -> dict[tuple[str, ...], list[Check]]:
+    """Return the checks that each change makes fail, so that it is flown once for all of them."""
+    found: dict[tuple[str, ...], list[Check]] = {}
+    for check in scenario.checks:
+        if check.fails_with:
+            found.setdefault(tuple(check.fails_with), []).append(check)
+    return found
+
+
+def flights() -> Iterator[Any]:
+    for name in scenario_names():
+        for overrides, checks in mutations(load(name)[0]).items():
+            mutated, _ = load(name, overrides)
+            long = mutated.duration / mutated.rates.physics > LONG
+            yield pytest.param(
+                name,
+                overrides,
+                checks,
+                id=f"{name}:{';'.join(overrides)}",
+                marks=pytest.mark.long if long else pytest.mark.slow,
+            )
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_check_says_what_it_fails_with(name: str) -> None:
+    lacking = [check.name for check in load(name)[0].checks if not check.fails_with]
+    assert bool(lacking) is (name in UNFINISHED), lacking
+
+
+@pytest.mark.parametrize(("name", "overrides", "checks"), list(flights()))
+def test_a_check_comes_out_the_other_way_when_what_it_claims_is_gone(
+    name: str, overrides: tuple[str, ...], checks: list[Check], tmp_path: Path
+) -> None:
+    # The other checks may need a longer flight than this change lasts.
+    alone = load(name)[0].model_copy(update={"checks": checks})
+    (tmp_path / "alone.toml").write_text(to_toml(alone))
+    result = run(tmp_path / "alone.toml", overrides=overrides, out=tmp_path)
+    assert not result.trouble
+    for verdict in result.verdicts:
+        assert verdict.outcome == ("PASS" if verdict.check.expected == "FAIL" else "FAIL"), (
+            verdict.line
+        )
