@@ -2,11 +2,13 @@
 
 import dataclasses
 import math
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -220,3 +222,16 @@ def first_difference(logged: Rows, flown: Rows) -> Difference | None:
                 k, i = map(int, places[0])
                 found = Difference(float(time[k]), topic, name, i, float(a[k, i]), float(b[k, i]))
     return found
+
+
+class _Callable(ModuleType):
+    """This module, once imported, is what ``mjspace.replay`` names: it flies as the function does.
+
+    A package's attribute is the submodule of that name, whatever the package defines itself.
+    """
+
+    def __call__(self, *arguments: Any, **options: Any) -> Result:
+        return replay(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _Callable

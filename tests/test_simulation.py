@@ -188,8 +188,8 @@ def test_trouble_ends_the_flight_and_keeps_every_good_period(
     kept: list[Block] = []
     with pytest.raises(FlightError, match=message):
         kept.extend(fly(built, first_start(built, (0,))))
-    assert [len(block.time) for block in kept] == [11]  # 0 to 10 ms
-    for fields in kept[0].rows.values():
+    assert sum(len(block.time) for block in kept) == 11  # 0 to 10 ms
+    for fields in (fields for block in kept for fields in block.rows.values()):
         for values in fields.values():
             assert np.isfinite(values).all()
 
@@ -219,8 +219,8 @@ def test_stop_is_obeyed_at_once() -> None:
 
     built = assembly("contraction-ideal")
     blocks = list(fly(built, first_start(built, (0,)), stop=stop))
-    assert len(blocks) == 1
-    assert 15 <= len(blocks[0].time) <= 21
+    # Asked once more after each block, of which a slow machine makes more.
+    assert sum(len(block.time) for block in blocks) == 22 - len(blocks)
 
 
 def test_a_disturbance_of_ones_own_acts_and_is_logged(tmp_path: Path) -> None:
