@@ -29,6 +29,7 @@ ONLY_IN = {
             "start",
             "columns",
             "environment",
+            "bearing_friction",
             "struct_offsets",
             "guards",
             "simulation",
