@@ -19,6 +19,7 @@ from mjspace.errors import blamed_on
 from mjspace.faults import FaultSet
 from mjspace.geomagnetism import FieldAlongOrbit, along
 from mjspace.gimbal_servos import GimbalServos
+from mjspace.hinge_tables import Friction
 from mjspace.magnetorquers import CoilSet
 from mjspace.motor_drives import MotorDrives
 from mjspace.one_by_one import OneByOne
@@ -252,11 +253,11 @@ def _of_gimbals(table: PlantTable, vehicle: Vehicle) -> dict[str, Any]:
     }
 
 
-def _friction(table: PlantTable) -> dict[str, float]:
-    """Return the Coulomb friction of the hinges that have some, by name."""
-    wheels = {f"wheel_{i}": table.wheels.coulomb_friction for i in range(len(table.wheels.axes))}
-    every = wheels | {name: hinge.coulomb_friction for name, hinge in table.hinges.items()}
-    return {name: torque for name, torque in every.items() if torque}
+def _friction(table: PlantTable) -> dict[str, Friction]:
+    """Return the dry friction of the hinges that have some, by name."""
+    wheels = {f"wheel_{i}": table.wheels.friction for i in range(len(table.wheels.axes))}
+    every = wheels | {name: hinge.friction for name, hinge in table.hinges.items()}
+    return {name: friction for name, friction in every.items() if friction is not None}
 
 
 def _part(key: str, build: Callable[..., Any], *arguments: Any) -> Any:

@@ -138,6 +138,18 @@ def test_no_wheel_passes_its_speed_limit(tmp_path: Path, control: float) -> None
         assert told[message] == pytest.approx(control * np.floor(instant / control), abs=0.011)
 
 
+def test_the_instant_of_a_limit_does_not_depend_on_the_control_period(tmp_path: Path) -> None:
+    path = satellite(tmp_path, "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]")
+    settings = ["plant.wheels.speed_limit='6500 rpm'", "law.torque=[1e-3, 0, -3e-3]", "duration=3"]
+    rows, seldom = (
+        flown(assemble(*load(path, [*settings, f"rates.control={control}"])))[0]
+        for control in (0.01, 1.0)
+    )
+    for name, values in seldom["/truth"].items():
+        every = rows["/truth"][name][::100]
+        np.testing.assert_allclose(values, every, rtol=1e-13, atol=1e-16, err_msg=name)
+
+
 def test_wheels_that_span_too_little_say_so_and_are_saturated(tmp_path: Path) -> None:
     path = satellite(tmp_path, "[[0, 0, 1]]")
     told = (

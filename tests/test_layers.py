@@ -30,6 +30,7 @@ ONLY_IN = {
             "start",
             "columns",
             "environment",
+            "bearing_friction",
             "struct_offsets",
             "guards",
             "simulation",
