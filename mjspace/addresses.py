@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace import guards
+from mjspace import stability
 
 ENGINE = ("engine_outer", "engine_inner", "engine_thrust")
 """The motors of an engine on gimbals, in the order of ``ctrl``."""
@@ -77,7 +77,7 @@ def axes(model: Any, dofs: Any) -> Any:
 
 def axial_inertia(model: Any, dofs: Any) -> Any:
     """Return the inertia [kg m^2] of all that each hinge turns, about its axis, shape (n,)."""
-    return guards.mass_matrix(model)[dofs, dofs]
+    return stability.mass_matrix(model)[dofs, dofs]
 
 
 def _engine(model: Any) -> list[str]:

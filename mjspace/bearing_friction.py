@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.guards import ModelWarning, mass_matrix
+from mjspace.guards import ModelWarning
 from mjspace.hinge_tables import Friction
+from mjspace.stability import mass_matrix
 
 SPEED = 0.1
 """Speed [rad/s] over which friction is smoothed through zero, where the step is short enough."""

@@ -8,7 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace.contract import Array
+from mjspace import stability
+from mjspace.stability import Linear, mass_matrix
 
 _FEWEST_STEPS = 10.0  # a revolution: RK4's error of the wobble is 1.7e-4 there
 
@@ -21,23 +22,34 @@ def check(model: Any) -> None:
     """Refuse or warn of what would be silently wrong in a compiled model.
 
     Raises:
-        ValueError: automatic reset, armature, gravity or damping on a free flyer, a step too long
-            for a servo or a damper; all of them are named, each with its number and its cure.
+        ValueError: automatic reset, sleep, armature, gravity, or a damper, spring or friction on a
+            free flyer, a step too long for a servo, spring or damper; all of them are named, each
+            with its number and its cure.
 
     Warns:
-        ModelWarning: an integrator other than RK4 for bodies on joints, colliding geometry on a
-            free flyer, or constraints that are switched off.
+        ModelWarning: an integrator other than RK4 for bodies on joints, colliding geometry or a
+            fluid on a free flyer, a damper or servo of the wrong sign, constraints that are
+            switched off, or a range that is not enforced.
     """
+    linear = stability.linearized(model)
     refused = [
         *_autoreset(model),
+        *_sleep(model),
         *_armature(model),
         *_uniform_gravity(model),
-        *_braked_free_joint(model),
-        *_stiff_joints(model),
+        *_held_free_joint(model),
+        *_stiff_joints(model, linear),
     ]
     if refused:
         raise ValueError("\n".join(refused))
-    for finding in (*_integrator(model), *_collisions(model), *_ignored_constraints(model)):
+    for finding in (
+        *_integrator(model),
+        *_collisions(model),
+        *_fluid(model),
+        *_driven_joints(model, linear),
+        *_ignored_constraints(model),
+        *_ignored_ranges(model),
+    ):
         warnings.warn(finding, ModelWarning, stacklevel=3)
 
 
@@ -71,6 +83,14 @@ def _autoreset(model: Any) -> Iterator[str]:
         )
 
 
+def _sleep(model: Any) -> Iterator[str]:
+    if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP and _free(model).any():
+        yield (
+            f"sleep is enabled: below {model.opt.sleep_tolerance:g} rad/s or m/s MuJoCo stops a "
+            'vehicle; remove <flag sleep="enable"/>'
+        )
+
+
 def _armature(model: Any) -> Iterator[str]:
     bare = copy.copy(model)
     bare.dof_armature[:] = 0.0
@@ -80,7 +100,7 @@ def _armature(model: Any) -> Iterator[str]:
     for dof in np.flatnonzero(with_it != without):
         share = 1.0 - without[dof] / with_it[dof]
         yield (
-            f"joint {_joint_name(model, dof)!r} has armature {with_it[dof] - without[dof]:.4g}: "
+            f"{_joint_name(model, dof)} has armature {with_it[dof] - without[dof]:.4g}: "
             f"{share:.1%} of its momentum would have no reaction on the bus, while the total still "
             f"seems conserved; give the inertia to a body instead"
         )
@@ -95,34 +115,51 @@ def _uniform_gravity(model: Any) -> Iterator[str]:
         )
 
 
-def _braked_free_joint(model: Any) -> Iterator[str]:
+def _held_free_joint(model: Any) -> Iterator[str]:
     for joint in np.flatnonzero(_free(model)):
-        damping = model.dof_damping[model.jnt_dofadr[joint]]
-        if damping > 0.0:
-            yield (
-                f"free joint {model.joint(joint).name!r} has damping {damping:g}: the world would "
-                f"brake the vehicle; use <freejoint/>, which inherits none"
-            )
+        dofs = slice(model.jnt_dofadr[joint], model.jnt_dofadr[joint] + 6)
+        for what, values in (
+            ("damping", (model.dof_damping[dofs], model.dof_dampingpoly[dofs])),
+            ("stiffness", (model.jnt_stiffness[joint], model.jnt_stiffnesspoly[joint])),
+            ("frictionloss", (model.dof_frictionloss[dofs],)),
+        ):
+            largest = max(float(np.abs(value).max()) for value in values)
+            if largest > 0.0:
+                yield (
+                    f"free {_joint_name(model, dofs.start)} has {what} {largest:g}: the world "
+                    f"would hold the vehicle; use <freejoint/>, which inherits none"
+                )
 
 
-def _stiff_joints(model: Any) -> Iterator[str]:
-    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
+def _stiff_joints(model: Any, linear: Linear | None) -> Iterator[str]:
+    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4 or linear is None:
         return
-    damping, stiffness = _servo(model)
-    inertia = inertia_at_joints(model)
     step = model.opt.timestep
-    for dof in np.flatnonzero((damping > 0.0) | (stiffness > 0.0)):
-        if model.jnt_type[model.dof_jntid[dof]] == mujoco.mjtJoint.mjJNT_FREE:
-            continue
-        z = step * np.roots([1.0, damping[dof] / inertia[dof], stiffness[dof] / inertia[dof]])
-        growth = np.abs(1.0 + z + z**2 / 2.0 + z**3 / 6.0 + z**4 / 24.0).max()
-        if growth > 1.0 + 1e-12:
-            yield (
-                f"joint {_joint_name(model, dof)!r} has damping {damping[dof]:.4g}, stiffness "
-                f"{stiffness[dof]:.4g} and inertia {inertia[dof]:.4g}: RK4 makes it grow by "
-                f"{growth:.3g} in each step of {step:g} s; a step below "
-                f"{2.78 * step / np.abs(z).max():.2g} s would do"
-            )
+    mode = stability.growing(linear, step)
+    if mode is not None:
+        # What a torque between two bodies has to move: the inertia seen from the joint.
+        inertia = 1.0 / np.linalg.inv(linear.inertia)[mode.dof, mode.dof]
+        # Rounding of the numerical slopes is no damping.
+        damping, stiffness = (
+            round(float(matrix[mode.dof, mode.dof]), 9) + 0.0
+            for matrix in (linear.damping, linear.stiffness)
+        )
+        yield (
+            f"{_joint_name(model, mode.dof)} has damping {damping:.4g}, stiffness {stiffness:.4g} "
+            f"and inertia {inertia:.4g}: RK4 makes it grow by {mode.growth:.3g} in each step of "
+            f"{step:g} s; use a step below {mode.step:.2g} s"
+        )
+
+
+def _driven_joints(model: Any, linear: Linear | None) -> Iterator[str]:
+    if linear is None:
+        return
+    slopes = np.diag(linear.damping)
+    for dof in np.flatnonzero(slopes < -1e-6 * np.abs(linear.damping).max()):
+        yield (
+            f"{_joint_name(model, dof)} has damping {slopes[dof]:.4g}: a damper or servo of the "
+            f"wrong sign drives it faster and faster"
+        )
 
 
 def _integrator(model: Any) -> Iterator[str]:
@@ -149,6 +186,14 @@ def _collisions(model: Any) -> Iterator[str]:
         )
 
 
+def _fluid(model: Any) -> Iterator[str]:
+    if _free(model).any() and (model.opt.density > 0.0 or model.opt.viscosity > 0.0):
+        yield (
+            f"the medium has density {model.opt.density:g} kg/m^3 and viscosity "
+            f"{model.opt.viscosity:g} Pa s: it brakes a free flyer; leave both out in space"
+        )
+
+
 def _ignored_constraints(model: Any) -> Iterator[str]:
     if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONSTRAINT:
         return
@@ -158,6 +203,15 @@ def _ignored_constraints(model: Any) -> Iterator[str]:
         yield (
             f"constraints are disabled, so {limits} joint limits, {frictions} friction losses and "
             f"{model.neq} equalities are ignored; bearings take plant.wheels.coulomb_friction"
+        )
+
+
+def _ignored_ranges(model: Any) -> Iterator[str]:
+    for joint in np.flatnonzero((model.jnt_limited == 0) & np.any(model.jnt_range, axis=1)):
+        low, high = model.jnt_range[joint]
+        yield (
+            f"{_joint_name(model, model.jnt_dofadr[joint])} has a range, {low:.4g} to {high:.4g}, "
+            f'that is not enforced: limited="false"'
         )
 
 
@@ -174,38 +228,12 @@ def _imbalanced(model: Any, joint: int) -> bool:
     return bool(np.linalg.norm(offset) > 1e-12 or np.linalg.norm(product) > 1e-12 * scale)
 
 
-def _servo(model: Any) -> tuple[Array, Array]:
-    """Return each dof's damping and stiffness, those of joint servos included, shapes (nv,)."""
-    damping, stiffness = model.dof_damping.copy(), np.zeros(model.nv)
-    single = np.flatnonzero(model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE))  # slides, hinges
-    stiffness[model.jnt_dofadr[single]] = model.jnt_stiffness[single]
-    for actuator in np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT):
-        dof = model.jnt_dofadr[model.actuator_trnid[actuator, 0]]
-        gear = model.actuator_gear[actuator, 0] ** 2
-        damping[dof] += gear * model.actuator_damping[actuator]
-        if model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE:
-            stiffness[dof] -= gear * model.actuator_biasprm[actuator, 1]
-            damping[dof] -= gear * model.actuator_biasprm[actuator, 2]
-    return damping, stiffness
-
-
-def inertia_at_joints(model: Any) -> Array:
-    """Return, for each dof, what a torque between the joint's two bodies has to move, (nv,)."""
-    return 1.0 / np.diag(np.linalg.inv(mass_matrix(model))) if model.nv else np.zeros(0)
-
-
-def mass_matrix(model: Any) -> Array:
-    """Return the mass matrix (nv, nv), joints at rest."""
-    data = mujoco.MjData(model)
-    mujoco.mj_fwdPosition(model, data)
-    matrix = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, matrix)
-    return matrix
-
-
 def _free(model: Any) -> Any:
     return model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
 
 
 def _joint_name(model: Any, dof: Any) -> str:
-    return str(model.joint(model.dof_jntid[dof]).name)
+    joint = model.joint(model.dof_jntid[dof])
+    if joint.name:
+        return f"joint {joint.name!r}"
+    return f"joint {joint.id} (unnamed, of body {model.body(model.jnt_bodyid[joint.id]).name!r})"

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Self
 import numba
 import numpy as np
 
-from mjspace import guards
+from mjspace import guards, stability
 from mjspace.actuators import Fields, State
 from mjspace.contract import Array, Measurement
 from mjspace.plant import Vehicle
@@ -56,7 +56,7 @@ class ReactionWheels:
             guards.ModelWarning: they are alone, and there are axes about which they give no torque.
         """
         count = len(vehicle.wheel_axes)
-        inertia = guards.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[:count]]
+        inertia = stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[:count]]
         limits = vehicle.torque_limit, vehicle.speed_limit
         wheels = cls(vehicle.wheel_axes, *limits, shared_by, inertia)
         if alone and len(wheels.unreachable):

@@ -7,12 +7,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjspace import guards
+from mjspace import guards, stability
 
 SOUND = """
 <mujoco>
   <option timestep="{step}" integrator="{integrator}" gravity="{gravity}">
-    <flag contact="{contact}" constraint="{constraint}" autoreset="{autoreset}"/>
+    <flag contact="{contact}" constraint="{constraint}" autoreset="{autoreset}" {flag}/>
   </option>
   <worldbody>
     <body name="bus">
@@ -26,6 +26,7 @@ SOUND = """
       </body>
     </body>
   </worldbody>
+  <tendon>{tendon}</tendon>
   <actuator>{actuator}</actuator>
 </mujoco>
 """
@@ -41,6 +42,8 @@ DEFAULTS = {
     "offset": "0",
     "tilt": "0",
     "actuator": '<motor name="motor" joint="spin"/>',
+    "tendon": "",
+    "flag": "",
 }
 SHARE = 1.0 / (1.0 / 0.05 + 1.0 / 0.7)  # kg m^2: what the motor turns, rotor against bus
 
@@ -65,6 +68,15 @@ def test_a_sound_model_passes_in_silence() -> None:
         ),
         ({"gravity": "0 0 -9.81"}, r"gravity is \[ 0\. +0\. +-9\.81\] m/s\^2"),
         ({"free": '<joint name="bus" type="free" damping="1"/>'}, "'bus' has damping 1: the world"),
+        (
+            {"free": '<joint name="bus" type="free" stiffness="2"/>'},
+            "free joint 'bus' has stiffn.* 2:",
+        ),
+        (
+            {"free": '<joint type="free" frictionloss="3"/>'},
+            r"free joint 0 \(unnamed, of body 'bus'\)",
+        ),
+        ({"flag": 'sleep="enable"'}, "sleep is enabled: below 0.001 rad/s or m/s MuJoCo stops a"),
     ],
 )
 def test_defects_are_refused(defect: dict[str, str], message: str) -> None:
@@ -85,6 +97,11 @@ def test_every_defect_is_named_at_once() -> None:
         ({"contact": "enable", "constraint": "enable"}, "2 geoms may collide"),
         ({"joint": 'frictionloss="0.1"'}, "1 friction losses"),
         ({"joint": 'limited="true" range="-1 1"'}, "1 joint limits"),
+        (
+            {"joint": 'limited="false" range="-90 90"'},
+            r"'spin' has a range, -90 to 90, that",
+        ),
+        ({"actuator": '<velocity joint="spin" kv="-2"/>'}, "'spin' has damping -2: .* wrong sign"),
     ],
 )
 def test_doubts_are_warned_of(defect: dict[str, str], message: str) -> None:
@@ -105,6 +122,13 @@ def test_a_world_with_a_floor_may_have_gravity_and_contacts() -> None:
         {"actuator": '<velocity joint="spin" kv="{kv}"/>'},
         {"actuator": '<position joint="spin" kp="1e-9" kv="{kv}"/>'},
         {"actuator": '<motor joint="spin" gear="2" damping="{quarter}"/>'},
+        {"tendon": '<fixed damping="{kv}"><joint joint="spin" coef="1"/></fixed>'},
+        {
+            "tendon": '<fixed name="cord"><joint joint="spin" coef="2"/></fixed>',
+            "actuator": '<velocity tendon="cord" kv="{quarter}"/>',
+        },
+        # What a motor can give at most does not make its slope less steep.
+        {"actuator": '<velocity joint="spin" kv="{kv}" forcerange="-1e9 1e9"/>'},
     ],
 )
 def test_servo_bound_is_where_rk4_really_diverges(servo: dict[str, str]) -> None:
@@ -120,7 +144,9 @@ def test_servo_bound_is_where_rk4_really_diverges(servo: dict[str, str]) -> None
         if stable:
             guards.check(servoed)
         else:
-            with pytest.raises(ValueError, match=r"'spin' has damping.*below 0\.00099 s would do"):
+            with pytest.raises(
+                ValueError, match=r"'spin' has damping.*use a step below 0\.00099 s"
+            ):
                 guards.check(servoed)
 
 
@@ -166,3 +192,40 @@ def test_the_wobble_error_is_as_large_as_the_warning_says() -> None:
     amplitude = np.ptp(xs) / 2.0
     # Measured 1.38e-4 here; the sampling of the circle's extremes adds 1e-6.
     assert amplitude / radius - 1.0 == pytest.approx(-1.4e-4, rel=0.05)
+
+
+FOUR_BAR = """
+<mujoco>
+  <option timestep="{step}" integrator="RK4" gravity="0 0 0"><flag autoreset="disable"/></option>
+  <worldbody>
+    <body><joint name="a" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 2"/></body>
+    <body><joint name="b" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>
+  </worldbody>
+  <tendon><fixed name="belt" stiffness="{stiffness}" springlength="0">
+    <joint joint="a" coef="1"/><joint joint="b" coef="-1"/></fixed></tendon>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize(("factor", "stable"), [(0.99, True), (1.01, False)])
+def test_joints_that_a_tendon_couples_are_judged_together(factor: float, stable: bool) -> None:
+    """Two rotors on a belt swing at sqrt(k (1/2 + 1/1)): RK4's bound is 2.83 over that."""
+    step = factor * np.sqrt(8.0) / np.sqrt(300.0 * 1.5)
+    belted = mujoco.MjModel.from_xml_string(FOUR_BAR.format(step=step, stiffness=300.0))
+    data = mujoco.MjData(belted)
+    data.qvel[:] = 1.0, -2.0
+    mujoco.mj_step(belted, data, 400)
+    assert (np.abs(data.qvel).max() < 3.0) == stable
+    if stable:
+        guards.check(belted)
+    else:
+        # the lighter one has most of the motion
+        with pytest.raises(ValueError, match="joint 'b' has damping 0, stiffness 300"):
+            guards.check(belted)
+
+
+def test_a_model_without_joints_or_of_very_many_is_not_linearized() -> None:
+    assert stability.linearized(mujoco.MjModel.from_xml_string("<mujoco/>")) is None
+    balls = '<body><joint type="ball"/><geom size="1"/></body>' * (stability.LARGEST // 3 + 1)
+    many = f"<mujoco><worldbody>{balls}</worldbody></mujoco>"
+    assert stability.linearized(mujoco.MjModel.from_xml_string(many)) is None

@@ -1,7 +1,7 @@
 """The command ``mjspace validate``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -20,29 +20,26 @@ def validate(
         typer.Option("--quick", help="Each benchmark once, short; no faults, orders and figures."),
     ] = False,
     model: Annotated[
-        Path | None, typer.Option(help="Examine this MJCF or MJB model instead.")
+        Path | None, typer.Option(help="Examine this MJCF, URDF or MJB model instead.")
     ] = None,
     basilisk: Annotated[
         str, typer.Option(metavar="PYTHON", help="Also compare with the bsk of this interpreter.")
     ] = "",
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write; runs/validate/<UTC stamp> when left out.")
+        Path | None,
+        typer.Option(
+            help="Folder to write; runs/validate/<UTC stamp> when left out, none with --model."
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Measure MuJoCo's physics against closed forms; or the physics of a model of yours."""
     if model is not None:
-        if only or quick or basilisk or out:
-            raise InputError("--model: a passport is of one model: leave the other options out")
-        from mjspace.validation import passport, table
-
-        with blamed_on(f"--model {model}"):
-            issued = passport.issue(model)
-        if as_json:
-            print(issued.model_dump_json(indent=2))
-        else:
-            table.show_passport(issued)
-        raise typer.Exit(0 if issued.passed else 1)
+        if only or quick or basilisk:
+            raise InputError(
+                "--model: a passport is of one model: leave --only, --quick and --basilisk out"
+            )
+        _examine(model, out, as_json)
 
     workers.warm_up("mjspace.validation.benchmarks")
     from mjspace.flight import output_folder
@@ -61,3 +58,21 @@ def validate(
         table.show(results)
         print(f"data   {data}\nreport {page}")
     raise typer.Exit(0 if results.passed else 1)
+
+
+def _examine(model: Path, out: Path | None, as_json: bool) -> NoReturn:
+    """Print the passport of one model, and write it where a folder is named."""
+    from mjspace import mujoco_log
+    from mjspace.validation import passport, report, table
+
+    mujoco_log.silence()
+    with blamed_on(f"--model {model}"):
+        issued = passport.issue(model)
+    written = () if out is None else report.write_passport(issued, out)
+    if as_json:
+        print(issued.model_dump_json(indent=2))
+    else:
+        table.show_passport(issued)
+        for what, path in zip(("data", "report"), written, strict=False):
+            print(f"{what:6} {path}")
+    raise typer.Exit(0 if issued.passed else 1)

@@ -69,6 +69,7 @@ def _sums(record: Record) -> _Sums:
         data.qpos[:], data.qvel[:] = qpos, qvel
         mujoco.mj_kinematics(record.model, data)
         mujoco.mj_comPos(record.model, data)
+        mujoco.mj_tendon(record.model, data)  # whose springs count
         mujoco.mj_fwdVelocity(record.model, data)
         mujoco.mj_energyPos(record.model, data)
         rows.append((*_of_row(record.model, data), data.energy[0]))
@@ -77,7 +78,7 @@ def _sums(record: Record) -> _Sums:
 
 def _of_row(model: Any, data: Any) -> tuple[Array, Array, Array, float]:
     """Return centre of mass, linear and angular momentum about it, and kinetic energy."""
-    moving = np.flatnonzero(model.body_weldid)
+    moving = np.flatnonzero(model.body_treeid >= 0)
     mass, place = model.body_mass[moving], data.xipos[moving]
     # MuJoCo keeps velocities at the centre of mass of each tree.
     rate, velocity = data.cvel[moving, :3], data.cvel[moving, 3:]

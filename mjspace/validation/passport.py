@@ -1,8 +1,9 @@
-"""The physics passport of any MJCF model: guards, conservation, order of convergence, step advice.
+"""The physics passport of any model: guards, conservation, order of convergence, step advice.
 
 The model is flown free, without gravity, contact or control: moving as its first keyframe says
 and, where that leaves a speed at zero, at a tenth of a radian or metre per second. What is
-conserved then shows how far its integrator and step can be trusted.
+conserved then shows how far its integrator and step can be trusted. What cannot be judged that
+way, as energy where soft constraints store some, is named with the reason.
 """
 
 import copy
@@ -16,21 +17,22 @@ import mujoco
 import numpy as np
 from pydantic import computed_field
 
-from mjspace import guards
-from mjspace.contract import Array
-from mjspace.validation import convergence, meter, stand
-from mjspace.validation.benchmark import Bound, Conditions
+from mjspace import guards, stability
+from mjspace.validation import convergence, model_files, model_ties
+from mjspace.validation.benchmark import Bound
+from mjspace.validation.conservation import MINUTE, Flight
 from mjspace.validation.convergence import Convergence
+from mjspace.validation.model_files import Source
 from mjspace.validation.results import Data, Row
 
-MINUTE = 60.0  # s, that conservation is watched and steps are advised for
 STIR = 0.1  # rad/s, m/s
-CONSERVED = 1e-8
-"""Relative drift in a minute that is allowed: a thousandth of what a star tracker sees."""
 GOALS = (1e-9, 1e-6)  # rad in a minute
 ORDERS_OFF = 0.3
 """How far an observed order may be from the scheme's: steps are coarse, and the motion any."""
+ADVISED_OFF = 1.0
+"""How far it may be for a step to be extrapolated from it."""
 _ORDERS = {"RK4": 4.0, "EULER": 1.0, "IMPLICIT": 1.0, "IMPLICITFAST": 1.0}
+_JUMPING = mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS | mujoco.mjtDisableBit.mjDSBL_LIMIT
 
 
 class Finding(Data):
@@ -50,6 +52,8 @@ class Passport(Data):
     findings: list[Finding]
     rows: list[Row]
     advice: list[str]
+    unjudged: list[str]
+    """What was not judged, and why."""
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -59,52 +63,53 @@ class Passport(Data):
 
 
 def issue(path: Path) -> Passport:
-    """Measure the model in an MJCF file, or a compiled one in an MJB file.
+    """Measure the model in an MJCF or URDF file, or a compiled one in an MJB file.
 
     Raises:
-        ValueError: MuJoCo cannot compile the file, or nothing in it moves.
+        ValueError: MuJoCo cannot compile the file, nothing in it moves, or its step is not
+            positive.
         OSError: the file cannot be read.
     """
-    model = _load(path)
-    findings = list(_findings(model))
+    source = model_files.read(path)
+    model = source.model
+    if model.nv == 0:
+        raise ValueError("nothing in it moves: it has no joints")
+    if not model.opt.timestep > 0.0:
+        raise ValueError(f"its timestep is {model.opt.timestep:g} s: it must be positive")
     free = _undisturbed(model)
     start = _stirred(free)
-    found = convergence.observe(free, start)
+    flight = Flight(free, start)
+    smooth = copy.copy(free)
+    smooth.opt.disableflags |= _JUMPING
+    orderly = not (model_ties.soft(model) or model_ties.springs_yield(model))
+    found = convergence.observe(smooth, start) if orderly else []
     return Passport(
         model=str(path),
         integrator=_name(model),
         step=model.opt.timestep,
-        findings=findings,
-        rows=[*_conservation(free, start), *_order(free, found)],
-        advice=list(_advice(free, start, found)),
+        findings=list(_findings(source, flight)),
+        rows=[*flight.rows(), *_order(smooth, found)],
+        advice=[*flight.advice(), *(_advice(smooth, start, found) if orderly else ())],
+        unjudged=[*flight.unjudged(), *_left_out(source, flight), *_unresolved(smooth, found)],
     )
 
 
-def _load(path: Path) -> Any:
-    path.open("rb").close()  # MuJoCo's own message does not say why a file cannot be read
-    try:
-        if path.suffix not in (".xml", ".mjb"):
-            raise ValueError("give an MJCF model, .xml, or a compiled one, .mjb")
-        if path.suffix == ".mjb":
-            model = mujoco.MjModel.from_binary_path(str(path))
-        else:
-            # Parts are found beside a file that is named in full.
-            model = mujoco.MjSpec.from_file(str(path.resolve())).compile()
-    except ValueError as error:
-        raise ValueError(", ".join(str(error).splitlines())) from error
-    if model.nv == 0:
-        raise ValueError("nothing in it moves: it has no joints")
-    return model
-
-
-def _findings(model: Any) -> Iterator[Finding]:
+def _findings(source: Source, flight: Flight) -> Iterator[Finding]:
+    model = source.model
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", guards.ModelWarning)
         try:
             guards.check(model)
         except ValueError as error:
             yield from (Finding(refused=True, text=line) for line in str(error).splitlines())
-    yield from (Finding(refused=False, text=str(warning.message)) for warning in caught)
+    end = flight.broken_off()
+    if end is not None:
+        text = f"flown free, its state is no longer finite after {end:g} s of {flight.duration:g} s"
+        yield Finding(refused=True, text=text)
+    told = [*(str(warning.message) for warning in caught), *source.warnings]
+    told += model_ties.findings(model)
+    told += [] if source.spec is None else model_files.findings(source.spec)
+    yield from (Finding(refused=False, text=text) for text in told)
 
 
 def _undisturbed(model: Any) -> Any:
@@ -132,75 +137,57 @@ def _stirred(model: Any) -> Any:
     return data
 
 
-def _conservation(model: Any, start: Any) -> Iterator[Row]:
-    record = stand.fly(Conditions(model.opt.timestep), model, copy.copy(start), MINUTE)
-    energy = meter.kinetic_energy(record) + meter.potential_energy(record)
-    spin, size = _of_the_bus(model, start) or (0.0, energy[0])
-    if spin:
-        reason = "nothing acts from outside: what drifts is the integrator's error, or armature"
-        yield Row.judged(
-            Bound("angular momentum", "of the bus", CONSERVED, reason),
-            meter.drift(meter.angular_momentum(record), spin),
+def _left_out(source: Source, flight: Flight) -> Iterator[str]:
+    """Yield what the flights were without, and what has no order."""
+    model = source.model
+    soft = model_ties.soft(model)
+    if soft:
+        yield (
+            f"order and step with soft constraints ({', '.join(soft)}): they are stiff springs and "
+            f"dampers, whose transients hide the integrator's error"
         )
-        place = meter.centre_of_mass(record)
-        straight = place[0] + np.outer(record.time - record.time[0], _mean_velocity(record))
-        reason = "it moves on a straight line, whatever turns inside"
-        yield Row.judged(
-            Bound("centre of mass", "m", CONSERVED, reason),
-            float(np.linalg.norm(place - straight, axis=1).max()),
+    if model_ties.springs_yield(model):
+        yield "order and step with springs that yield: their force has a corner"
+    jumping = ["dry friction"] if model_ties.has_friction(model) else []
+    jumping += ["stops that are reached"] if flight.hits_stops else []
+    if jumping:
+        yield (
+            f"order and step with {' and '.join(jumping)}: forces that jump leave no order; both "
+            f"are judged without"
         )
-    if _dissipates(model):
-        bound = Bound("energy gained", "of the bus", CONSERVED, "dampers only take")
-        yield Row.judged(bound, float(np.diff(energy).max(initial=0.0) / size))
-    else:
-        bound = Bound("energy", "of the bus", CONSERVED, "nothing in the model dissipates")
-        yield Row.judged(bound, meter.drift(energy, size))
-
-
-def _of_the_bus(model: Any, start: Any) -> tuple[float, float] | None:
-    """Return momentum [N m s] and energy [J] of the first free flyer, turning as one body.
-
-    The share of a fast wheel would hide the errors of the bus. None for a fixed base.
-    """
-    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    if not free.size:
-        return None
-    matrix = np.zeros((model.nv, model.nv))
-    mujoco.mj_forward(model, start)
-    mujoco.mj_fullM(model, start, matrix)
-    turning = slice(model.jnt_dofadr[free[0]] + 3, model.jnt_dofadr[free[0]] + 6)
-    rate = start.qvel[turning]
-    momentum = matrix[turning, turning] @ rate
-    return float(np.linalg.norm(momentum)), float(0.5 * rate @ momentum)
-
-
-def _mean_velocity(record: stand.Record) -> Array:
-    mass = record.model.body_mass[record.model.body_weldid != 0].sum()
-    velocity: Array = meter.linear_momentum(record)[0] / mass
-    return velocity
-
-
-def _dissipates(model: Any) -> bool:
-    return bool(
-        np.any(model.dof_damping)
-        or np.any(model.dof_frictionloss)
-        or np.any(model.tendon_damping)
-        or np.any(model.tendon_frictionloss)
-        or np.any(model.dof_dampingpoly)
-    )
+    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    if not model.opt.disableflags & off and np.any(model.geom_contype | model.geom_conaffinity):
+        yield "contacts: every flight here is without them"
+    if model.nu:
+        yield (
+            f"{model.nu} actuators: every flight here is without control"
+            + (", their stiffness and damping about rest apart" if _is_rk4(model) else "")
+        )
+    if model.nv > stability.LARGEST:
+        yield (
+            f"the step's stability with springs, dampers and servos: {model.nv} degrees of freedom "
+            f"are more than the {stability.LARGEST} up to which it is computed"
+        )
+    if source.spec is None:
+        yield "the compiler's settings: a compiled model does not say how it was made"
 
 
 def _order(model: Any, found: Convergence) -> Iterator[Row]:
     expected = _ORDERS.get(_name(model))
     observed = convergence.slope(found)
-    if expected is None or math.isnan(observed):
+    if expected is None or math.isnan(observed) or _is_unresolved(model, found):
         return
-    reason = f"{_name(model)} is of that order where nothing jumps, as contacts and limits do"
+    reason = f"{_name(model)} is of that order where nothing jumps, as friction and stops do"
     yield Row.judged(Bound("order of convergence", "", ORDERS_OFF, reason, expected), observed)
 
 
+def _is_unresolved(model: Any, found: Convergence) -> bool:
+    """Tell whether the error falls faster than the scheme's, as where a stiff motion dies out."""
+    return convergence.slope(found) > _ORDERS.get(_name(model), math.inf) + ORDERS_OFF
+
+
 def _advice(model: Any, start: Any, found: Convergence) -> Iterator[str]:
-    if _name(model) != "RK4":
+    if not _is_rk4(model):
         yield f"{_name(model)} is of first order; with RK4 in its place:"
         model = copy.copy(model)
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
@@ -208,9 +195,36 @@ def _advice(model: Any, start: Any, found: Convergence) -> Iterator[str]:
     if not found:
         yield f"no step down to {model.opt.timestep / 4.0:.2g} s resolves this motion: try a tenth"
         return
+    what = "attitude" if np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE) else "joints"
+    yield from step_advice(found, what)
+
+
+def step_advice(found: Convergence, what: str) -> Iterator[str]:
+    """Yield the steps that keep ``what`` within ``GOALS``, if RK4's order was observed."""
+    order = convergence.slope(found)
+    if abs(order - _ORDERS["RK4"]) > ADVISED_OFF:
+        steps = f"{found[0][0]:.2g} to {found[-1][0]:.2g} s"
+        yield (
+            f"no step can be advised: over steps of {steps} the error falls with order "
+            f"{order:.2g}, not 4, so that no other step can be told from them"
+        )
+        return
     for goal in GOALS:
         step = convergence.step_for(found, goal, MINUTE)
-        yield f"a step of {step:.2g} s keeps the attitude within {goal:.0e} rad for a minute"
+        yield f"a step of {step:.2g} s keeps the {what} within {goal:.0e} rad for a minute"
+
+
+def _unresolved(model: Any, found: Convergence) -> Iterator[str]:
+    if _is_unresolved(model, found):
+        yield (
+            f"order: over steps of {found[0][0]:.2g} to {found[-1][0]:.2g} s the error falls with "
+            f"order {convergence.slope(found):.2g}, faster than {_name(model)}'s own: a stiff "
+            f"motion is only just resolved there"
+        )
+
+
+def _is_rk4(model: Any) -> bool:
+    return bool(model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4)
 
 
 def _name(model: Any) -> str:

@@ -8,6 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from mjspace import workers
 from mjspace.validation import figures, wording
 from mjspace.validation.benchmark import FAULTS
+from mjspace.validation.passport import Passport
 from mjspace.validation.results import Results, Section
 
 JSON, HTML = "validation.json", "validation.html"
@@ -25,8 +26,23 @@ def write(results: Results, folder: Path) -> tuple[Path, Path]:
     data, page = folder / JSON, folder / HTML
     data.write_text(results.model_dump_json() + "\n")
     page.write_text(
-        _rendered("report.html.j2", results, figures={} if results.quick else _drawn(results))
+        _rendered(
+            "report.html.j2", results=results, figures={} if results.quick else _drawn(results)
+        )
     )
+    return data, page
+
+
+def write_passport(passport: Passport, folder: Path) -> tuple[Path, Path]:
+    """Write a model's passport as JSON and HTML into ``folder``, made if need be; return the paths.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    data, page = folder / "passport.json", folder / "passport.html"
+    data.write_text(passport.model_dump_json(indent=2) + "\n")
+    page.write_text(_rendered("passport.html.j2", passport=passport))
     return data, page
 
 
@@ -40,7 +56,7 @@ def write_markdown(results: Results, page: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, drawing in _drawn(results).items():
         (folder / f"{name}.svg").write_text(drawing)
-    page.write_text(_rendered("report.md.j2", results, figures=folder.name))
+    page.write_text(_rendered("report.md.j2", results=results, figures=folder.name))
 
 
 def _drawn(results: Results) -> dict[str, str]:
@@ -49,8 +65,11 @@ def _drawn(results: Results) -> dict[str, str]:
     return {results.sections[index].name: drawing for index, drawing in workers.each(calls)}
 
 
-def _rendered(template: str, results: Results, *, figures: str | dict[str, str]) -> str:
-    """Return the page; ``figures`` are themselves, or the name of the folder that they are in."""
+def _rendered(template: str, **shown: Any) -> str:
+    """Return the page of what is ``shown``: ``results`` and ``figures``, or a ``passport``.
+
+    ``figures`` are themselves, or the name of the folder that they are in.
+    """
     environment = Environment(
         loader=PackageLoader("mjspace.validation"),
         autoescape=select_autoescape(["html.j2"]),
@@ -58,8 +77,6 @@ def _rendered(template: str, results: Results, *, figures: str | dict[str, str])
     )
     environment.filters["cell"] = lambda text: text.replace("|", "\\|")
     words: dict[str, Any] = {
-        "results": results,
-        "figures": figures,
         "faults": FAULTS,
         "others": wording.OTHERS,
         "measured": wording.measured,
@@ -67,7 +84,7 @@ def _rendered(template: str, results: Results, *, figures: str | dict[str, str])
         "under": wording.under,
         "anchor": _anchor,
     }
-    return environment.get_template(template).render(words)
+    return environment.get_template(template).render(words | shown)
 
 
 def _anchor(section: Section) -> str:

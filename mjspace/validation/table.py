@@ -1,5 +1,7 @@
 """The results as a table on the terminal."""
 
+from functools import partial
+
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -18,9 +20,7 @@ def show(results: Results) -> None:
 
     A narrow terminal is spared the reasons of the bounds; the report has them.
     """
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=_WIDE)
+    console = _console()
     console.print(_quantities(results, reasons=console.width >= _WIDE))
     if not results.quick:
         console.print()
@@ -37,15 +37,15 @@ def show(results: Results) -> None:
 
 def show_passport(passport: Passport) -> None:
     """Print what the guards say of the model, what was measured of it, and which step it needs."""
-    console = Console()
-    console.print(
+    console = _console()
+    say = partial(console.print, highlight=False, soft_wrap=True)
+    say(
         f"{passport.model}: {passport.integrator}, step {passport.step:g} s",
-        highlight=False,
         markup=False,
     )
     for finding in passport.findings:
         word = "[bold red]refused[/]" if finding.refused else "[yellow]warning[/]"
-        console.print(f"{word}: {escape(finding.text)}", highlight=False)
+        say(f"{word}: {escape(finding.text)}")
     table = _table("quantity", "measured", "allowed", "verdict", "why that bound")
     for row in passport.rows:
         table.add_row(
@@ -56,8 +56,16 @@ def show_passport(passport: Passport) -> None:
             escape(row.reason),
         )
     console.print(table)
+    for reason in passport.unjudged:
+        say(f"[yellow]not judged[/]: {escape(reason)}")
     for advice in passport.advice:
-        console.print(advice, highlight=False, markup=False)
+        say(advice, markup=False)
+
+
+def _console() -> Console:
+    """Return the terminal; where there is none, one wide enough for the reasons."""
+    console = Console()
+    return console if console.is_terminal else Console(width=_WIDE)
 
 
 def _quantities(results: Results, *, reasons: bool) -> Table:

@@ -80,3 +80,22 @@ def test_no_basilisk_is_a_remark() -> None:
         results = basilisk.compared(nothing, python)
         assert results.passed
         assert said in results.remarks[0]
+
+
+def test_a_passport_is_saved_where_a_folder_is_named(tmp_path: Path) -> None:
+    model = tmp_path / "lone.xml"
+    model.write_text(
+        "<mujoco><worldbody><body><freejoint/>"
+        '<inertial pos="0 0 0" mass="1" diaginertia="1 2 2.5"/></body></worldbody></mujoco>'
+    )
+    folder = tmp_path / "here"
+    done = validate("--model", model, "--out", folder)
+    assert done.returncode == 1
+    assert str(folder / "passport.html") in done.stdout
+    saved = json.loads((folder / "passport.json").read_text())
+    assert saved["passed"] is False
+    assert next(row["quantity"] for row in saved["rows"]) == "angular momentum"
+    page = (folder / "passport.html").read_text()
+    assert "automatic reset is on" in page
+    assert ">FAIL</span>" in page
+    assert str(model) in page

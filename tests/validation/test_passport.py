@@ -100,9 +100,27 @@ def test_the_advised_step_errs_by_what_was_said(tmp_path: Path, goal: int) -> No
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("model.txt", WHEEL, "give an MJCF model, .xml, or a compiled one, .mjb"),
-        ("model.xml", "<mujoco><worldbody></mujoco>", "XML parse error"),
+        ("model.txt", WHEEL, r"MJCF \(.xml\), URDF \(.urdf or .xml\) or compiled \(.mjb\) file"),
+        (
+            "model.xml",
+            "<mujoco><worldbody></mujoco>",
+            "XML parse error 14, Error=.* name=worldbody$",
+        ),
         ("model.xml", "<mujoco/>", "it has no joints"),
+        ("model.xml", "", "empty file"),
+        ("model.xml", "\0\1", "XML parse error"),
+        ("model.xml", "<svg/>", "'svg'"),
+        (
+            "model.xml",
+            WHEEL.replace('"0.01"', '"0"', 1),
+            "its timestep is 0 s: it must be positive",
+        ),
+        ("model.xml", WHEEL.replace('"0.01"', '"-1"', 1), "its timestep is -1 s"),
+        ("model.xml", WHEEL.replace("10 12 14", "1 1 3"), r"A \+ B >= C"),
+        ("model.xml", '<mujoco><include file="nowhere.xml"/></mujoco>', "'nowhere.xml'"),
+        ("model.urdf", "<robot/>", "it has no joints"),
+        ("model.mjb", "<mujoco/>", "no compiled model of MuJoCo 4"),
+        ("model.mjb", "", "no compiled model of MuJoCo 4"),
     ],
 )
 def test_models_that_will_not_do(tmp_path: Path, name: str, text: str, message: str) -> None:

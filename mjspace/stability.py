@@ -1,0 +1,103 @@
+"""Whether RK4 is stable at a model's step: its springs, dampers and servos about their rest.
+
+The forces of joints, tendons and actuators are linearized numerically, so that coupled joints,
+tendons and every kind of transmission count.
+"""
+
+import copy
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjspace.contract import Array
+
+LARGEST = 150
+"""Degrees of freedom up to which a model is linearized: beyond, it takes too long."""
+_NUDGE = 1e-6  # rad, m, and per second: rounding and the forces' curvature both far below
+_INSIDE = 2.0
+"""RK4 is stable for every decaying or undamped mode whose |eigenvalue| x step is below this."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Generalized force = -damping qvel - stiffness (q - q0), controls at zero; each (nv, nv)."""
+
+    inertia: Array
+    damping: Array
+    stiffness: Array
+
+
+@dataclass(frozen=True)
+class Mode:
+    """The fastest growing mode of a model under RK4."""
+
+    dof: int
+    """The degree of freedom that takes most part in it."""
+    growth: float
+    """By which factor it grows in each step."""
+    step: float
+    """Below which it would not [s]."""
+
+
+def linearized(model: Any) -> Linear | None:
+    """Return the model about its initial position, at rest; None beyond ``LARGEST`` dofs."""
+    if not 0 < model.nv <= LARGEST:
+        return None
+    free = copy.copy(model)
+    # What a servo can give at most is none of its slope.
+    free.actuator_forcelimited[:] = 0
+    free.jnt_actfrclimited[:] = 0
+    free.tendon_actfrclimited[:] = 0
+    data = mujoco.MjData(free)
+    rest = data.qpos.copy()
+
+    def force(shift: Array, rate: Array) -> Array:
+        data.qpos[:], data.qvel[:] = rest, rate
+        mujoco.mj_integratePos(free, data.qpos, shift, 1.0)
+        mujoco.mj_forward(free, data)
+        return np.array(data.qfrc_passive + data.qfrc_actuator)
+
+    still = np.zeros(free.nv)
+    nudges = _NUDGE * np.eye(free.nv)
+    stiffness, damping = (
+        np.array([force(*at(-nudge)) - force(*at(nudge)) for nudge in nudges]).T / (2.0 * _NUDGE)
+        for at in (lambda nudge: (nudge, still), lambda nudge: (still, nudge))
+    )
+    return Linear(mass_matrix(model), damping, stiffness)
+
+
+def growing(linear: Linear, step: float) -> Mode | None:
+    """Return the mode that RK4 makes grow most at ``step`` [s]; None where all of them decay.
+
+    Modes that grow by themselves are no fault of the step, and left out.
+    """
+    size = len(linear.inertia)
+    accelerated = -np.linalg.solve(linear.inertia, np.hstack([linear.stiffness, linear.damping]))
+    values, vectors = np.linalg.eig(
+        np.vstack([np.hstack([np.zeros((size, size)), np.eye(size)]), accelerated])
+    )
+    z = step * values
+    growth = np.abs(1.0 + z + z**2 / 2.0 + z**3 / 6.0 + z**4 / 24.0)
+    growth[(np.abs(z) < _INSIDE) | (z.real > 1e-6 * np.abs(z))] = 0.0
+    worst = int(np.argmax(growth))
+    if growth[worst] <= 1.0 + 1e-9:
+        return None
+    # The kinetic energy that each degree of freedom has in it
+    share = np.abs(vectors[size:, worst]) ** 2 * np.diag(linear.inertia)
+    return Mode(int(np.argmax(share)), float(growth[worst]), float(2.78 * step / abs(z[worst])))
+
+
+def inertia_at_joints(model: Any) -> Array:
+    """Return, for each dof, what a torque between the joint's two bodies has to move, (nv,)."""
+    return 1.0 / np.diag(np.linalg.inv(mass_matrix(model))) if model.nv else np.zeros(0)
+
+
+def mass_matrix(model: Any) -> Array:
+    """Return the mass matrix (nv, nv), joints at rest."""
+    data = mujoco.MjData(model)
+    mujoco.mj_fwdPosition(model, data)
+    matrix = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, matrix)
+    return matrix
