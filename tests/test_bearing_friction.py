@@ -95,7 +95,7 @@ def test_it_comes_to_rest_with_any_step(
         before, (energy, now) = energy, energy_and_momentum(model, data)
         assert energy <= before * (1.0 + 1e-12) + 1e-30  # rounding
         assert now == pytest.approx(momentum, rel=1e-12, abs=1e-15)
-        assert data.qvel[6] >= 0.0  # it does not turn back
+        assert data.qvel[6] >= -1e-300  # it does not turn back; denormals round
     assert data.qvel[6] < 1e-5 * smoothing
 
 
