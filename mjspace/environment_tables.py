@@ -37,7 +37,7 @@ class Orbit(Table):
             raise ValueError(
                 f"semi_major_axis: got {self.semi_major_axis:.10g} m, with which the periapsis, "
                 f"{lowest:.6g} m from the centre, is inside the {self.body}, whose radius is "
-                f"{radius:.6g} m{meant if 1e3 * lowest > radius else ''}"
+                f"{radius:.6g} m{meant if radius < 1e3 * lowest < 100.0 * radius else ''}"
             )
         return self
 

@@ -73,9 +73,10 @@ def validate(
     except ValidationError as error:
         told: dict[str, list[str]] = {}
         for problem in error.errors():
-            key = ".".join(str(part) for part in problem["loc"])
+            text = _explain(".".join(str(part) for part in problem["loc"]), problem)
+            key = text.partition(":")[0]
             source = next((o for k, o in origins.items() if _related(k, key)), where)
-            told.setdefault(source, []).append(_explain(key, problem))
+            told.setdefault(source, []).append(text)
         raise InputError("; ".join(f"{s}: {'; '.join(p)}" for s, p in told.items())) from None
 
 

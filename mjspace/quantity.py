@@ -134,6 +134,4 @@ def _split(value: str) -> tuple[float, str]:
     try:
         return float(number), " ".join(written.split())
     except ValueError:
-        raise ValueError(
-            f"got the text {value!r}, should be a number, or one with a unit"
-        ) from None
+        raise ValueError(f"got {value!r}, should be a number or a number with a unit") from None

@@ -142,9 +142,12 @@ def _importable(folder: Path, files: Mapping[str, bytes]) -> Iterator[None]:
         del sys.modules[name]
     sys.path.insert(0, str(folder))
     importlib.invalidate_caches()
+    # A cached bytecode is taken for new by its second and size alone.
+    writes_none, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         yield
     finally:
+        sys.dont_write_bytecode = writes_none
         sys.path.remove(str(folder))
         for name in loaded():
             del sys.modules[name]

@@ -25,7 +25,8 @@ def scenarios() -> list[Scenario]:
     return [load(name)[0] for name in scenario_names()]
 
 
-_RCS = next(s.plant.rcs for s in scenarios() if s.name == "rcs-three-axis")
+_RCS = load("rcs-three-axis")[0].plant.rcs
+assert _RCS is not None
 FACTS: dict[str, Any] = {
     "inertia": np.diag([10.0, 11.0, 12.0]),
     "wheel_axes": np.eye(3),

@@ -80,6 +80,22 @@ def test_what_is_wrong_is_said(kind: str, gains: dict[str, object], message: str
         build(kind, **gains)
 
 
+def test_a_quantity_for_a_gain_without_a_unit_is_refused_with_the_cure(tmp_path: Path) -> None:
+    (tmp_path / "damper.py").write_text(DAMPER)
+    for bad, message in (
+        (
+            "30 N m s/rad",
+            r"gain: got '30 N m s/rad', but .* declares no unit .* gain\('N m s/rad'\)",
+        ),
+        ("7", r"gain: got '7', should be a number"),
+        (True, r"gain: got True, should be a number"),
+        (float("nan"), r"gain: got nan, should be a number"),
+        (["3 deg", 1.0], r"gain: got '3 deg', but"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            build("damper.py:Damper", tmp_path, gain=bad)
+
+
 def test_a_law_of_ones_own_is_flown_one_by_one(tmp_path: Path) -> None:
     (tmp_path / "damper.py").write_text(DAMPER)
     law, flown = build("damper.py:Damper", tmp_path, gain=3.0)

@@ -32,7 +32,7 @@ pytestmark = [
     for kind in (UnphysicalInertiaWarning, ModelWarning)
 ]
 
-SHORT = "duration=0.05"
+SHORT = "duration=0.048"  # a whole number of all control periods here
 NOISY = [
     "sensors.rate.noise=0.01",
     "sensors.rate.bias_walk=0.001",

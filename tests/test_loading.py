@@ -155,6 +155,150 @@ def test_unknown_scenario_gives_the_nearest() -> None:
         load("nowhere.toml")
 
 
+def test_another_kind_on_the_command_line_starts_afresh_in_any_order(minimal: Path) -> None:
+    changes = ["law.rate_gain=3", "law.kind=pd_plus:Classical", "reference.kind=references:Slew"]
+    for overrides in (changes, changes[::-1]):
+        scenario, _ = load("contraction-adaptive", overrides)
+        assert scenario.law.kind == "pd_plus:Classical"
+        assert scenario.law.gains == {"rate_gain": 3}
+        assert scenario.reference.gains == {}
+    same, _ = load("contraction-adaptive", ["law.kind=contraction:Adaptive"])
+    assert same.law == load("contraction-adaptive")[0].law
+    mission, _ = load("mission", ["law.phases.0.law.kind=coast:Coast"])
+    assert mission.law.gains["phases"][0]["law"] == {"kind": "coast:Coast"}
+    assert mission.law.gains["phases"][1:] == load("mission")[0].law.gains["phases"][1:]
+
+
+def test_all_that_is_wrong_is_said_in_one_line(minimal: Path) -> None:
+    minimal.write_text(MINIMAL + "gian = 2\n[plant]\nmass = 'heavy'\n[initial]\nrate = 3\n")
+    message = refusal(minimal, "duration=-1", "seed=true")
+    for part in (
+        f"{minimal}: plant.mass: got 'heavy'",
+        "initial.rate: got 3, should be a list",
+        "--set duration=-1: duration: got -1",
+        "--set seed=true: seed: got True, should be a whole number",
+    ):
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "part"),
+    [
+        ("flight.mcap", "", "the log of a flight, for 'mjspace replay'"),
+        ("model.xml", "<mujoco/>", "'mjspace validate --model'"),
+        ("law.py", "", 'kind = "law.py:Class"'),
+        ("notes.txt", "", "'mjspace list'"),
+        ("pyproject.toml", "[tool]\n[project]\n", "it has tool, project, but no duration or law"),
+        ("empty.toml", "", "it has nothing, but no duration or law"),
+    ],
+)
+def test_a_file_that_is_no_scenario_is_told_apart(
+    tmp_path: Path, name: str, text: str, part: str
+) -> None:
+    (tmp_path / name).write_text(text)
+    message = refusal(tmp_path / name)
+    assert name in message
+    assert part in message
+    assert "is a folder" in refusal(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("override", "parts"),
+    [
+        ("inclination=97.4", ["inclination: got 97.4 rad", "did you mean '97.4 deg'?"]),
+        ("inclination='400 deg'", ["inclination: got 6.98", "less than or equal to 3.14"]),
+        ("inclination='-20 deg'", ["inclination: got -0.349", "greater than or equal to 0"]),
+        ("true_anomaly=90", ["true_anomaly: got 90 rad", "did you mean '90 deg'?"]),
+        (
+            "semi_major_axis=6977.67",
+            ["semi_major_axis: got 6977.67 m", "did you mean '6977.67 km'"],
+        ),
+        ("semi_major_axis='6300 km'", ["semi_major_axis: got 6300000 m", "inside the earth"]),
+        ("eccentricity=0.2", ["semi_major_axis", "periapsis", "inside the earth"]),
+        ("eccentricity=1", ["eccentricity", "less than 1"]),
+    ],
+)
+def test_an_orbit_that_means_something_else_is_refused(
+    minimal: Path, override: str, parts: list[str]
+) -> None:
+    orbit = "environment.orbit={semi_major_axis='7000 km'}"
+    message = refusal(minimal, orbit, f"environment.orbit.{override}")
+    for part in parts:
+        assert part in message
+    assert "did you mean" in parts[-1] or "did you mean" not in message
+
+
+@pytest.mark.parametrize(
+    ("override", "parts"),
+    [
+        ("seed=true", ["seed: got True", "a whole number"]),
+        ("plant.mass=true", ["plant.mass: got True", "a number"]),
+        ("plant.mass='7'", ["'7' has no unit", "kg"]),
+        ("plant.mass='x'", ["got 'x', should be a number"]),
+        ("plant.ideal_thrusters=1", ["plant.ideal_thrusters: got 1", "true or false"]),
+        ("plant.wheels.axes=[[0,0,0]]", ["plant.wheels.axes.0", "no direction"]),
+        ("initial.attitude=[1,0,0,0.1]", ["initial.attitude", "norm is 1.00499", "0.001"]),
+        ("initial.attitude=[1,0,0,'7']", ["initial.attitude", "the text '7'"]),
+        ("plant.ground.slope=20", ["plant.ground.slope: got 20 rad", "did you mean '20 deg'?"]),
+        ("environment.magnetic_field.epoch=7", ["epoch: got 7, should be a date"]),
+    ],
+)
+def test_nonsense_is_refused(minimal: Path, override: str, parts: list[str]) -> None:
+    message = refusal(minimal, override)
+    for part in parts:
+        assert part in message
+
+
+def test_a_quaternion_may_be_rounded_to_three_decimals(minimal: Path) -> None:
+    load(minimal, ["initial.attitude=[0.707, 0, 0.707, 0]"])
+
+
+@pytest.mark.parametrize(
+    ("check", "part"),
+    [
+        ("target=0, relative=true, below=1", "relative: the target is zero"),
+        ("target=[0, 0, 0], relative=true, below=1", "relative: the target is zero"),
+        ("target='x', below=1", "checks.0.target: got 'x'"),
+        ("target=nan, below=1", "checks.0.target: got nan"),
+        ("below=nan", "checks.0.below: got nan, should be finite"),
+        ("above=inf", "checks.0.above: got inf, should be finite"),
+        ("below=true", "checks.0.below: got True, should be a number"),
+        ("below='7'", "has no unit"),
+        ("below=1, above=1", "below 1 and above 1: nothing is inside"),
+        ("below=1, start=1.5, end=1.2", "checks.0.start: 1.5 s is after end, 1.2 s"),
+        ("below=1, start=2.5", "checks.0.start: 2.5 s is after the flight's end, duration 2 s"),
+        ("below=1, start=1.0002, end=1.0004", "nothing is logged from 1.0002 to 1.0004 s"),
+    ],
+)
+def test_a_check_that_judges_nothing_is_refused(minimal: Path, check: str, part: str) -> None:
+    table = f"[[checks]]\nname = 'x'\nsignal = 'truth.rate'\n{check.replace(', ', chr(10))}\n"
+    if "[" in check:
+        table = "[[checks]]\nname = 'x'\nsignal = 'truth.rate'\ntarget = [0, 0, 0]\n"
+        table += "relative = true\nbelow = 1\n"
+    minimal.write_text(MINIMAL + table)
+    assert part in refusal(minimal)
+
+
+@pytest.mark.parametrize("window", ["start=1.0", "end=0.0", "start=2.0", "start=0.3, end=0.3"])
+def test_a_window_of_one_sample_is_enough(minimal: Path, window: str) -> None:
+    load(minimal, [f"checks=[{{name='x', signal='truth.rate', below=1, {window}}}]"])
+
+
+def test_a_shorter_flight_leaves_late_checks_out_and_says_so(minimal: Path) -> None:
+    late = "{name='late', signal='truth.rate', below=1, start=1.5}"
+    early = "{name='early', signal='truth.rate', below=1, end=1.9}"
+    with pytest.warns(UserWarning, match=r"after the flight's end, 1 s, left out: 'late'$"):
+        scenario, _ = load(minimal, [f"checks=[{late}, {early}]", "duration=1"])
+    assert [check.name for check in scenario.checks] == ["early"]
+
+
+def test_a_duration_is_a_whole_number_of_control_periods(minimal: Path) -> None:
+    message = refusal(minimal, "duration=0.0999", "rates.control='10 ms'")
+    assert message.startswith("--set duration=0.0999: duration: 0.0999 s is not a whole number of")
+    assert "the nearest are 0.09 s and 0.1 s" in message
+    load(minimal, ["duration=20", "rates.control=0.1"])  # 0.1 is no binary fraction
+
+
 def test_component_from_the_command_line() -> None:
     law = component("contraction:Ideal", ["rate_gain=3", "inertia=[[1,0,0],[0,1,0],[0,0,1]]"])
     assert law.gains == {"rate_gain": 3, "inertia": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}

@@ -18,6 +18,7 @@ from mjspace.scenario import Component
 
 KINDS = dict(kinds())
 TABLES = tables()
+NO_CHOICES: tuple[Any, ...] = (math.nan, -1, 7.5, [], {}, "30 N m", "nonsense")
 
 
 def documented(limits: str, value: float) -> bool:
@@ -81,7 +82,7 @@ def test_choices_and_switches_take_no_nonsense(name: str) -> None:
     for field in dataclasses.fields(kind):
         if "unit" in field.metadata:
             continue
-        for bad in (math.nan, -1, 7.5, [], {}, "30 N m", "nonsense"):
+        for bad in NO_CHOICES:
             with pytest.raises(ValueError, match=field.name) as refused:
                 construct(Component(kind=name, **gains | {field.name: bad}), kind, FACTS, Path())
             assert "\n" not in str(refused.value)

@@ -174,7 +174,7 @@ def test_a_thruster_pushes_where_it_is_and_along_its_direction(axes: Any) -> Non
     ("change", "message"),
     [
         ({"directions": [[1, 0, 0]]}, "1 rows for 2 positions"),
-        ({"directions": [[1, 0, 0], [0, 0, 0]]}, "one has no length"),
+        ({"directions": [[1, 0, 0], [0, 0, 0]]}, "which has no direction"),
         ({"propellant": None}, "give both or neither"),
     ],
 )

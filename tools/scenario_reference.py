@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
 from datetime import datetime
 from importlib import import_module
+from inspect import isabstract
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -20,18 +21,21 @@ HEAD = """# The scenario reference
 
 A scenario is a TOML file. This page is written by `python tools/scenario_reference.py` from the
 typed model that reads it. Unknown keys, wrong units and wrong shapes are refused with the file, the
-key and what would be right. Numbers are SI; where a unit is given, a string does too:
-`"30 deg/s"`, `"5 mN m"`, `"2 min"`. `mjspace info NAME` shows a scenario with every default written
-out, and `--set key=value` overrides any key.
+key and what would be right, and so is a number that is not finite or outside the range beside it.
+Numbers are SI; where a unit is given, a string with a unit does too: `"30 deg/s"`, `"5 mN m"`, `"2
+min"`. `mjspace info NAME` shows a scenario with every default written out, and `--set key=value`
+overrides any key.
 
 ## On top of another
 
 `base = "dgvscmg-tracking"` begins with another scenario, one that comes with mjspace or a file by
 its path from this file's folder (`base = "../calm.toml"`), and the rest of the file is what
 differs. Tables merge key by key; numbers and lists, `[[checks]]` among them, replace the base's. A
-`[law]` or `[reference]` of another `kind` starts afresh, with none of the base's gains. A base may
-have a base; `--set` comes last. Files that a base names are looked up from this file's folder. What
-is logged is the whole, without `base`.
+`[law]` or `[reference]` of another `kind` starts afresh, with none of the base's gains, and so it
+does under `--set law.kind=...`, in whatever order the overrides stand. A base may have a base;
+`--set` comes last. A `duration` that is set on the command line leaves out the checks that begin
+after the flight's end, with a warning. Files that a base names are looked up from this file's
+folder. What is logged is the whole, without `base`.
 """
 
 
@@ -52,25 +56,33 @@ def page() -> str:
 def _laws() -> list[str]:
     """Return what may stand behind ``kind``, with its gains."""
     lines = ["## Laws and references that come with mjspace", ""]
-    lines += ["| kind | gains (unit): default |", "|---|---|"]
+    lines += ["| kind | gains (unit, range): default |", "|---|---|"]
     package = import_module("mjspace.controllers")
     for path in sorted(Path(package.__path__[0]).glob("[a-z]*.py")):
         module = import_module(f"mjspace.controllers.{path.stem}")
         for name, kind in vars(module).items():
-            if is_dataclass(kind) and kind.__module__ == module.__name__:
-                gains = [_gain(f) for f in fields(kind) if "unit" in f.metadata]
-                if gains or not fields(kind):  # else a part of a law
-                    lines.append(f"| `{path.stem}:{name}` | {', '.join(gains)} |")
+            flies = hasattr(kind, "batched") or hasattr(kind, "at")
+            own = is_dataclass(kind) and kind.__module__ == module.__name__
+            if own and flies and not isabstract(kind):
+                gains = [_gain(f) for f in fields(kind)]
+                lines.append(f"| `{path.stem}:{name}` | {', '.join(gains)} |")
     closing = """
 A gain without a default must be given, but for `inertia`, `wheel_axes`, `wheel_inertia`,
 `control_period` and `inner_period` (the integration step): left out, they are those of the
-vehicle and the scenario as flown. Arrays may come from a CSV file: `file = "turn.csv"`, with a
-header that names the gains (`time,attitude0,attitude1,attitude2,attitude3`)."""
+vehicle and the scenario as flown. Every number of a gain is finite but where `inf`, no limit, is in
+its range. Arrays may come from a CSV file: `file = "turn.csv"`, with a header that names the gains
+(`time,attitude0,attitude1,attitude2,attitude3`).
+
+A law in a file of one's own may import modules beside it, at the top of the file, and read data
+files beside it that it lists: `DATA_FILES = ("table.csv",)`, found from `Path(__file__).parent`.
+They all go into the log, from which the flight is replayed without the folder."""
     return [*lines, closing, ""]
 
 
 def _gain(field: Field[Any]) -> str:
-    unit = f" ({field.metadata['unit']})" if field.metadata["unit"] else ""
+    words = [field.metadata.get(key, "") for key in ("unit", "range", "form")]
+    told = ", ".join(str(word) for word in words if str(word)).replace("|", "\\|")
+    unit = f" ({told})" if told else ""
     if field.default_factory is not MISSING:
         return f"`{field.name}`{unit}: {field.default_factory().tolist()}"
     return f"`{field.name}`{unit}" + ("" if field.default is MISSING else f": {field.default}")
@@ -115,7 +127,23 @@ def _kind(annotation: Any) -> str:
     words = {float: "number", int: "whole number", str: "text", bool: "true or false"}
     word = (words | {datetime: "date and time"})[scalar]
     count = f"{' x '.join(sizes)} {word}s" if sizes else word
-    return f"{count} [{unit}]" if unit else count
+    limits = _limits(annotation)
+    return f"{count} [{unit}]{limits}" if unit else f"{count}{limits}"
+
+
+def _limits(annotation: Any) -> str:
+    """Return the range of the numbers inside, as it is printed; empty where it has no end."""
+    if get_origin(annotation) not in (Annotated, list):
+        return ""
+    first, *marks = get_args(annotation)
+    ends = []
+    for mark in marks:
+        for limit in mark.metadata if isinstance(mark, FieldInfo) else [mark]:
+            for sign, name in ((">", "gt"), (">=", "ge"), ("<", "lt"), ("<=", "le")):
+                if hasattr(limit, name):
+                    ends.append(f"{sign} {getattr(limit, name):.4g}")
+    inner = _limits(first)
+    return inner + (f" {', '.join(ends)}" if ends else "")
 
 
 def _shape(annotation: Any) -> tuple[list[str], str, type]:
