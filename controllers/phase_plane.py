@@ -5,6 +5,9 @@ reaction-control slides. On each axis a'' = u, and u is U, -U or zero: U follows
 inertia. The printed initial conditions want a' (erratum 16), and the coasting line is
 a - a_0 = t a'_0 (erratum 17). The axes are taken to be independent; several of them together are so
 to second order in the angle. All arrays may have leading vehicle axes; m is the number of axes.
+
+A relay is electronics and no program: it is evaluated in every integration step, in ``inner``, and
+switches half of one late on average, whatever the control period.
 """
 
 from abc import ABC, abstractmethod
@@ -14,6 +17,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from mjspace import attitude as att
 from mjspace.contract import Array, Measurement, PulseCommand, Reference, gain
 
 from .allocation import effect, pattern
@@ -28,6 +32,19 @@ class State(NamedTuple):
 
     memory: Array
     """Of each axis, (..., m, k): its own docstring says what."""
+
+
+class Aim(NamedTuple):
+    """What the relays are told at a control instant, and what they command then."""
+
+    attitude: Array
+    """Of the desired axes, as a quaternion to inertial axes, (..., 4)."""
+    rate: Array
+    """Of the desired axes, in these axes [rad/s], (..., 3)."""
+    acceleration: Array
+    """Of the desired axes [rad/s^2], (..., 3): held until the next control instant."""
+    on_time: Array
+    """Of each thruster in the integration step that begins [s], (..., n)."""
 
 
 class Signals(NamedTuple):
@@ -58,6 +75,8 @@ class _PhasePlane(ABC):
     thruster_force: Array = gain("N", (None,))
     """Of each, (n,)."""
     control_period: float = gain("s")
+    inner_period: float = gain("s")
+    """For which a relay's state is held: the integration step."""
 
     def __post_init__(self) -> None:
         torques = self._effects[:3] @ self._patterns.swapaxes(1, 2)
@@ -89,14 +108,40 @@ class _PhasePlane(ABC):
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
-    ) -> tuple[State, PulseCommand, Signals]:
-        """Return for how long each thruster is on, and which way each axis is turned."""
+    ) -> tuple[State, Aim, Signals]:
+        """Return what the relays aim at, and which way each axis is turned at this instant."""
         angle, rate = turn(measurement, reference, self.axes)
-        memory, firing, duration = self._decide(state.memory, angle, rate)
+        _, firing, duration = self._decide(state.memory, angle, rate)
+        vehicles = measurement.rate.shape
+        aim = Aim(
+            np.broadcast_to(reference.attitude, measurement.attitude.shape),
+            np.broadcast_to(reference.rate, vehicles),
+            np.broadcast_to(reference.acceleration, vehicles),
+            self._on_time(firing, duration),
+        )
+        return state, aim, Signals(angle, rate, firing)
+
+    def inner(
+        self, state: State, time: float, command: Aim, measurement: Measurement
+    ) -> tuple[State, PulseCommand]:
+        """Return for how long each thruster is on in the integration step that begins."""
+        desired = Reference(command.attitude, command.rate, command.acceleration)
+        if command.rate.any() or command.acceleration.any():
+            since = time - self.control_period * np.floor(time / self.control_period + 1e-9)
+            gained = since * command.acceleration
+            turned = att.from_rotation_vector(since * (command.rate + 0.5 * gained))
+            attitude = att.multiply(command.attitude, turned)
+            desired = desired._replace(attitude=attitude, rate=command.rate + gained)
+        memory, firing, duration = self._decide(
+            state.memory, *turn(measurement, desired, self.axes)
+        )
+        return State(memory), PulseCommand(self._on_time(firing, duration))
+
+    def _on_time(self, firing: Array, duration: Array) -> Array:
         forth = np.where(firing > 0.0, duration, 0.0)[..., None] * self._patterns[0]
         back = np.where(firing < 0.0, duration, 0.0)[..., None] * self._patterns[1]
-        on_time = np.minimum((forth + back).sum(axis=-2), self.control_period)
-        return State(memory), PulseCommand(on_time), Signals(angle, rate, firing)
+        on_time: Array = np.minimum((forth + back).sum(axis=-2), self.inner_period)
+        return on_time
 
     def _recall(self, angle: Array, rate: Array) -> Array:
         """Return the first memory, (..., m, k)."""
@@ -107,8 +152,8 @@ class _PhasePlane(ABC):
         """Return (memory, which way to fire: 1, 0 or -1, for how long [s]), the latter (..., m)."""
 
     def _whole(self, firing: Array) -> tuple[Array, Array, Array]:
-        """Return a decision that holds for the whole period; it is remembered."""
-        return firing[..., None], firing, np.full_like(firing, self.control_period)
+        """Return a decision that holds for the whole integration step; it is remembered."""
+        return firing[..., None], firing, np.full_like(firing, self.inner_period)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +186,7 @@ class Sliding(_PhasePlane):
 class MinimumTime(_PhasePlane):
     """u = -U sgn(a + a' |a'| / 2U): to rest with one switch, from rest in 2 sqrt(a_0 / U).
 
-    It is off where |a| is below ``dead_band`` and |a'| below what one period gives.
+    It is off where |a| is below ``dead_band`` and |a'| below what one integration step gives.
     """
 
     dead_band: float = gain("rad", default=1e-3)
@@ -149,7 +194,7 @@ class MinimumTime(_PhasePlane):
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
         ahead = angle + rate * np.abs(rate) / (2.0 * self.acceleration)
-        slow = np.abs(rate) <= self.acceleration * self.control_period
+        slow = np.abs(rate) <= self.acceleration * self.inner_period
         arrived = slow & (np.abs(angle) <= self.dead_band)
         return self._whole(np.where(arrived, 0.0, -np.sign(ahead)))
 
@@ -159,7 +204,7 @@ class MinimumFuel(_PhasePlane):
     """To rest at the target in a fixed time with the least fuel: burn, coast, burn.
 
     The final time T is given, and no "minimum time" as printed (erratum 18). The burns are planned
-    once; of what begins within a control period, the impulse is right and the instant is early.
+    once; of what begins within a step, the impulse is right and the instant is early.
     Memory: the first burn [s], the second [s], its sense, the time elapsed [s].
     """
 
@@ -182,7 +227,7 @@ class MinimumFuel(_PhasePlane):
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
         first, second, sense, now = np.moveaxis(memory, -1, 0)
-        later, end = now + self.control_period, self.final_time
+        later, end = now + self.inner_period, self.final_time
         burn = np.clip(np.minimum(later, first) - now, 0.0, None)
         brake = np.clip(np.minimum(later, end) - np.maximum(now, end - second), 0.0, None)
         duration = np.where(burn > TICK, burn, brake)
@@ -242,6 +287,6 @@ class MinimumImpulse(_PhasePlane):
         leaves = (np.abs(s) >= self.dead_zone) & (s * rate > 0.0)
         idle = np.abs(left) <= TICK
         left = np.where(idle, np.where(leaves, -np.sign(s) * self.pulse, 0.0), left)
-        duration = np.minimum(np.abs(left), self.control_period)
+        duration = np.minimum(np.abs(left), self.inner_period)
         firing = np.sign(left)
         return (left - firing * duration)[..., None], firing, duration

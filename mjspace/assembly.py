@@ -147,7 +147,14 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             ripple,
         ),
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
-        actuators=_part("plant", _actuators, vehicle, scenario.plant, scenario.rates),
+        actuators=_part(
+            "plant",
+            _actuators,
+            vehicle,
+            scenario.plant,
+            scenario.rates,
+            inner=hasattr(law, "inner"),
+        ),
         reference=reference,
         law=law if getattr(law, "batched", False) else OneByOne(law),
         deployed=deployments.of(vehicle.model, qpos, parts, scenario.rates.physics),
@@ -176,7 +183,7 @@ def _in_log(role: str, kind: str) -> str:
     return f"{role}.py:{name}" if place.endswith(".py") else kind
 
 
-def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
+def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates, *, inner: bool) -> Together:
     kinds: list[Actuators] = []
     if table.drives:
         driven = [table.drives[name] for name in vehicle.motors if name in table.drives]
@@ -192,7 +199,7 @@ def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
     if table.ideal_thrusters:
         kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
     if table.rcs is not None:
-        kinds.append(Thrusters.of(vehicle, table.rcs, rates))
+        kinds.append(Thrusters.of(vehicle, table.rcs, rates, inner=inner))
     if table.magnetorquers is not None:
         coils = table.magnetorquers
         axes = np.array(coils.axes) / np.linalg.norm(coils.axes, axis=1, keepdims=True)
@@ -231,6 +238,6 @@ def _friction(table: PlantTable) -> dict[str, Friction]:
     return {name: friction for name, friction in every.items() if friction is not None}
 
 
-def _part(key: str, build: Callable[..., Any], *arguments: Any) -> Any:
+def _part(key: str, build: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
     with blamed_on(key):
-        return build(*arguments)
+        return build(*arguments, **named)
