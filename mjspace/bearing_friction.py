@@ -64,4 +64,5 @@ def smoothing(model: Any, frictions: Sequence[Friction], dofs: Sequence[int]) ->
         for f in frictions
     ]
     steepest = np.array([friction.steepest for friction in frictions])
-    return np.maximum(narrowest, gained * steepest / limit)
+    widths: Array = np.maximum(narrowest, gained * steepest / limit)
+    return widths
