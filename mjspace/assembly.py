@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace import addresses, central_gravity, deployments, environment, plant
+from mjspace import addresses, central_gravity, deployments, environment, faults, plant
 from mjspace.actuators import Actuators, IdealThrusters
 from mjspace.combined_actuators import Together
 from mjspace.components import construct, load_object, source_of
@@ -71,7 +71,13 @@ class Assembly:
     @property
     def driven_stepwise(self) -> bool:
         """Whether the actuators act in every integration step; else once in a control period."""
-        return hasattr(self.law, "inner") or self.actuators.stateful
+        inner = hasattr(self.law, "inner")
+        return inner or self.actuators.stateful or self.faults_between
+
+    @property
+    def faults_between(self) -> bool:
+        """Whether a fault begins or ends between control instants."""
+        return faults.between(self.scenario.faults, self.scenario.rates.control)
 
     @property
     def hold(self) -> float:

@@ -94,6 +94,7 @@ class _Flight:
         self.sensordata = self.batch.bind("sensordata")
         self.actuators, self.actuator_state = assembly.actuators, start.actuators
         self.faults = assembly.faults(members)
+        self.timed_faults = self.faults if assembly.faults_between else None
         self.inner = getattr(assembly.law, "inner", None)
         self.push = None
         if assembly.disturbance is not None:
@@ -209,12 +210,9 @@ class _Flight:
         return given, saturated
 
     def _weigh(self, masses: list[tuple[str, int, Array]]) -> None:
-        """Give bodies the masses of the middle of the integration step.
-
-        The constants that MuJoCo derives from them take 0.6 of a step's time: they are derived
-        again only where something burns.
-        """
+        """Give bodies the masses of the middle of the integration step; idle where none burns."""
         fields = [(self.batch.expand(name)[:, body], values) for name, body, values in masses]
+        # What MuJoCo derives from masses takes 0.6 of the time of a step.
         if any(not np.array_equal(field, values) for field, values in fields):
             for field, values in fields:
                 field[:] = values
@@ -237,6 +235,10 @@ class _Flight:
                     self.sensors, seen = self.suite.sample(self.sensors, first_step + step, truth)
                 if self.push is not None:
                     self.push(now, truth)
+                if self.timed_faults is not None:
+                    state = self.actuator_state
+                    self.actuator_state, begun = self.timed_faults.decide(state, now, None)
+                    tape.happened += begun
                 if self.driven_stepwise:
                     _, saturated = self._drive(now, command, seen, truth)
                     tape.saturated[-1] = np.maximum(tape.saturated[-1], saturated)

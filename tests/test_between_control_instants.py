@@ -164,6 +164,17 @@ def test_wheels_that_span_too_little_say_so_and_are_saturated(tmp_path: Path) ->
     assert not flown(built)[1]
 
 
+def test_a_fault_begins_and_ends_with_an_integration_step(tmp_path: Path) -> None:
+    path = satellite(tmp_path, "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]")
+    fault = "faults=[{motor='wheel_2', kind='dead', at='0.33 s', until='1.57 s'}]"
+    rows, events = flown(assemble(*load(path, [fault, "law.torque=[0, 0, -3e-5]", "duration=3"])))
+    # dead for 1.24 s of 3: J W' = 3e-5 N m against a bus of 0.03 kg m^2
+    inertia = 3e-6 * 0.03 / 0.030003
+    spun = rows["/truth"]["wheel_speed"][-1, 2] * inertia
+    assert spun == pytest.approx(3e-5 * (3.0 - 1.24), rel=1e-3)  # of the bus's other inertia
+    assert [time for time, *_ in events] == pytest.approx([0.33, 1.57])
+
+
 RELAY = [
     *("checks=[]", "duration=0.6", "rates.physics='1 ms'", "initial.euler=[0, 1e-4, 0]"),
     *("initial.rate=[0, 2e-3, 0]", "plant.rcs.delay='50 ms'", "plant.rcs.minimum_on='3 ms'"),
