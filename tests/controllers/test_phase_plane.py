@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mjspace.controllers import phase_plane as laws
+from mjspace.controllers.relays import State
 from mjspace.controllers.turn_kernels import turn
 
 from mjspace import attitude as att
@@ -81,7 +82,7 @@ def crossings(rows: Array, column: int = 1) -> Array:
 def test_thrusters_and_inertia_make_the_acceleration() -> None:
     flown = laws.Centre(**PLANT, control_period=0.1, inner_period=1e-3)
     np.testing.assert_allclose(flown.acceleration, [0.4 / 15.0, U, 0.4 / 18.0], rtol=1e-12)
-    _, command, _ = law(laws.Centre).step(laws.State(np.zeros((1, 1))), 0.0, seen(-0.1, 0.0), HOLD)
+    _, command, _ = law(laws.Centre).step(State(np.zeros((1, 1))), 0.0, seen(-0.1, 0.0), HOLD)
     np.testing.assert_allclose(command.on_time, 1e-3 * (np.eye(12)[4] + np.eye(12)[5]), atol=1e-15)
 
 
@@ -242,7 +243,7 @@ def test_a_batch_is_its_vehicles_and_a_step_changes_nothing(flown: Any) -> None:
         np.testing.assert_array_equal(command.on_time, same.on_time)
         for i in range(4):
             one = Measurement(*(array[i] for array in many[:3]))
-            alone = laws.State(state.memory[i])
+            alone = State(state.memory[i])
             _, aim_of_one, shown = flown.step(alone, 0.1 * k, one, HOLD)
             _, pulses = flown.inner(alone, 0.1 * k, aim_of_one, one)
             np.testing.assert_array_equal(command.on_time[i], pulses.on_time)
