@@ -7,113 +7,17 @@ a - a_0 = t a'_0 (erratum 17). The axes are taken to be independent; several of 
 to second order in the angle. All arrays may have leading vehicle axes; m is the number of axes.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
+from mjspace.contract import Array, gain
 
-from .allocation import effect, pattern
-from .turn_kernels import turn
-
-TICK = 1e-9
-"""s: what is left of a pulse that is over."""
-
-
-class State(NamedTuple):
-    """What a law remembers."""
-
-    memory: Array
-    """Of each axis, (..., m, k): its own docstring says what."""
-
-
-class Signals(NamedTuple):
-    """What a law shows."""
-
-    angle: Array
-    """a: of the body from where it should be, about each axis [rad], (..., m)."""
-    angle_rate: Array
-    """a' [rad/s], (..., m)."""
-    firing: Array
-    """1.0 or -1.0 while thrusters turn it that way about an axis, else 0.0, (..., m)."""
+from .relays import TICK, PhasePlane
 
 
 @dataclass(frozen=True, kw_only=True)
-class _PhasePlane(Gains, ABC):
-    """What these laws have in common: thrusters for both senses of each axis."""
-
-    batched: ClassVar[bool] = True
-
-    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
-    """Of the vehicle, body axes."""
-    axes: Array = gain(shape=(None, 3), default=np.eye(3), form="unit vector")
-    """Those that are controlled, unit vectors in body axes, (m, 3)."""
-    thruster_positions: Array = gain("m", ("thruster", 3))
-    """From the centre of mass, body axes, (n, 3)."""
-    thruster_directions: Array = gain(shape=("thruster", 3), form="unit vector")
-    """Of the force on the vehicle, body axes, (n, 3)."""
-    thruster_force: Array = gain("N", ("thruster",), above=0.0)
-    """Of each, (n,)."""
-    control_period: float = gain("s", above=0.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        torques = self._effects[:3] @ self._patterns.swapaxes(1, 2)
-        one, other = np.einsum("mi,sim->sm", self.axes, torques)
-        if not np.allclose(one, -other, rtol=1e-9):
-            raise ValueError(f"the thrusters turn it by {one} N m one way, {-other} N m the other")
-
-    @cached_property
-    def acceleration(self) -> Array:
-        """U of each axis [rad/s^2], (m,)."""
-        torques = self._effects[:3] @ self._patterns[0].T
-        moments = np.einsum("mi,ij,mj->m", self.axes, self.inertia, self.axes)
-        found: Array = np.einsum("mi,im->m", self.axes, torques) / moments
-        return found
-
-    @cached_property
-    def _effects(self) -> Array:
-        return effect(self.thruster_positions, self.thruster_directions, self.thruster_force)
-
-    @cached_property
-    def _patterns(self) -> Array:
-        """The thrusters' shares for a turn about each axis, and against it, (2, m, n)."""
-        ways = ([pattern(way * axis, self._effects) for axis in self.axes] for way in (1.0, -1.0))
-        return np.array(list(ways))
-
-    def reset(self, measurement: Measurement, reference: Reference) -> State:
-        """Return what is remembered at first."""
-        return State(self._recall(*turn(measurement, reference, self.axes)))
-
-    def step(
-        self, state: State, time: float, measurement: Measurement, reference: Reference
-    ) -> tuple[State, PulseCommand, Signals]:
-        """Return for how long each thruster is on, and which way each axis is turned."""
-        angle, rate = turn(measurement, reference, self.axes)
-        memory, firing, duration = self._decide(state.memory, angle, rate)
-        forth = np.where(firing > 0.0, duration, 0.0)[..., None] * self._patterns[0]
-        back = np.where(firing < 0.0, duration, 0.0)[..., None] * self._patterns[1]
-        on_time = np.minimum((forth + back).sum(axis=-2), self.control_period)
-        return State(memory), PulseCommand(on_time), Signals(angle, rate, firing)
-
-    def _recall(self, angle: Array, rate: Array) -> Array:
-        """Return the first memory, (..., m, k)."""
-        return np.zeros((*angle.shape, 1))
-
-    @abstractmethod
-    def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
-        """Return (memory, which way to fire: 1, 0 or -1, for how long [s]), the latter (..., m)."""
-
-    def _whole(self, firing: Array) -> tuple[Array, Array, Array]:
-        """Return a decision that holds for the whole period; it is remembered."""
-        return firing[..., None], firing, np.full_like(firing, self.control_period)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Centre(_PhasePlane):
+class Centre(PhasePlane):
     """u = -U sgn(a): a neutral centre of period 4 sqrt(2 a_0 / U), no limit cycle (erratum 8).
 
     a'^2/2 + U |a| stays; a loop that is late by tau makes it grow by 2 U tau |a'| at each switch.
@@ -124,7 +28,7 @@ class Centre(_PhasePlane):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sliding(_PhasePlane):
+class Sliding(PhasePlane):
     """u = -U sgn(a + k a'): a few switches, and then it slides in as exp(-t/k) (erratum 9).
 
     It slides where |a'| <= k U, with as many switches as the loop is fast, and burns all the while;
@@ -139,10 +43,10 @@ class Sliding(_PhasePlane):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MinimumTime(_PhasePlane):
+class MinimumTime(PhasePlane):
     """u = -U sgn(a + a' |a'| / 2U): to rest with one switch, from rest in 2 sqrt(a_0 / U).
 
-    It is off where |a| is below ``dead_band`` and |a'| below what one period gives.
+    It is off where |a| is below ``dead_band`` and |a'| below what one integration step gives.
     """
 
     dead_band: float = gain("rad", default=1e-3, at_least=0.0)
@@ -150,17 +54,17 @@ class MinimumTime(_PhasePlane):
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
         ahead = angle + rate * np.abs(rate) / (2.0 * self.acceleration)
-        slow = np.abs(rate) <= self.acceleration * self.control_period
+        slow = np.abs(rate) <= self.acceleration * self.inner_period
         arrived = slow & (np.abs(angle) <= self.dead_band)
         return self._whole(np.where(arrived, 0.0, -np.sign(ahead)))
 
 
 @dataclass(frozen=True, kw_only=True)
-class MinimumFuel(_PhasePlane):
+class MinimumFuel(PhasePlane):
     """To rest at the target in a fixed time with the least fuel: burn, coast, burn.
 
     The final time T is given, and no "minimum time" as printed (erratum 18). The burns are planned
-    once; of what begins within a control period, the impulse is right and the instant is early.
+    once; of what begins within a step, the impulse is right and the instant is early.
     Memory: the first burn [s], the second [s], its sense, the time elapsed [s].
     """
 
@@ -183,7 +87,7 @@ class MinimumFuel(_PhasePlane):
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
         first, second, sense, now = np.moveaxis(memory, -1, 0)
-        later, end = now + self.control_period, self.final_time
+        later, end = now + self.inner_period, self.final_time
         burn = np.clip(np.minimum(later, first) - now, 0.0, None)
         brake = np.clip(np.minimum(later, end) - np.maximum(now, end - second), 0.0, None)
         duration = np.where(burn > TICK, burn, brake)
@@ -192,7 +96,7 @@ class MinimumFuel(_PhasePlane):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Schmitt(_PhasePlane):
+class Schmitt(PhasePlane):
     """A Schmitt trigger on s = a + k a': on where |s| > delta, off where |s| < delta - hysteresis.
 
     It ends in a limit cycle with |a'| = hysteresis / 2k between the pulses, if slowly where k is
@@ -221,7 +125,7 @@ class Schmitt(_PhasePlane):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MinimumImpulse(_PhasePlane):
+class MinimumImpulse(PhasePlane):
     """One pulse against each way out of the dead zone: the least that keeps it within.
 
     A pulse takes dv = U times its length. Without a disturbance the cycle has the period
@@ -243,6 +147,6 @@ class MinimumImpulse(_PhasePlane):
         leaves = (np.abs(s) >= self.dead_zone) & (s * rate > 0.0)
         idle = np.abs(left) <= TICK
         left = np.where(idle, np.where(leaves, -np.sign(s) * self.pulse, 0.0), left)
-        duration = np.minimum(np.abs(left), self.control_period)
+        duration = np.minimum(np.abs(left), self.inner_period)
         firing = np.sign(left)
         return (left - firing * duration)[..., None], firing, duration

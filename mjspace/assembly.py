@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace import addresses, central_gravity, deployments, environment, plant
+from mjspace import addresses, central_gravity, deployments, environment, faults, plant
 from mjspace.actuators import Actuators, IdealThrusters
 from mjspace.combined_actuators import Together
 from mjspace.components import construct, load_object
@@ -79,7 +79,13 @@ class Assembly:
     @property
     def driven_stepwise(self) -> bool:
         """Whether the actuators act in every integration step; else once in a control period."""
-        return hasattr(self.law, "inner") or self.actuators.stateful
+        inner = hasattr(self.law, "inner")
+        return inner or self.actuators.stateful or self.faults_between
+
+    @property
+    def faults_between(self) -> bool:
+        """Whether a fault begins or ends between control instants."""
+        return faults.between(self.scenario.faults, self.scenario.rates.control)
 
     @property
     def hold(self) -> float:
@@ -155,7 +161,14 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             ripple,
         ),
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
-        actuators=_part("plant", _actuators, vehicle, scenario.plant, scenario.rates),
+        actuators=_part(
+            "plant",
+            _actuators,
+            vehicle,
+            scenario.plant,
+            scenario.rates,
+            inner=hasattr(law, "inner"),
+        ),
         reference=reference,
         law=law if getattr(law, "batched", False) else OneByOne(law),
         deployed=deployments.of(vehicle.model, qpos, parts, scenario.rates.physics),
@@ -205,7 +218,7 @@ def _in_log(role: str, kind: str, found: Any, sources: dict[str, bytes]) -> str:
     return f"{role}/{file}:{name}"
 
 
-def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
+def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates, *, inner: bool) -> Together:
     kinds: list[Actuators] = []
     if table.drives:
         driven = [table.drives[name] for name in vehicle.motors if name in table.drives]
@@ -221,7 +234,7 @@ def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
     if table.ideal_thrusters:
         kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
     if table.rcs is not None:
-        kinds.append(Thrusters.of(vehicle, table.rcs, rates))
+        kinds.append(Thrusters.of(vehicle, table.rcs, rates, inner=inner))
     if table.magnetorquers is not None:
         coils = table.magnetorquers
         axes = np.array(coils.axes) / np.linalg.norm(coils.axes, axis=1, keepdims=True)
@@ -260,6 +273,6 @@ def _friction(table: PlantTable) -> dict[str, Friction]:
     return {name: friction for name, friction in every.items() if friction is not None}
 
 
-def _part(key: str, build: Callable[..., Any], *arguments: Any) -> Any:
+def _part(key: str, build: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
     with blamed_on(key):
-        return build(*arguments)
+        return build(*arguments, **named)

@@ -65,5 +65,5 @@ def smoothing(model: Any, frictions: Sequence[Friction], dofs: Sequence[int]) ->
         for f in frictions
     ]
     steepest = np.array([friction.steepest for friction in frictions])
-    widened: Array = np.maximum(narrowest, gained * steepest / limit)
-    return widened
+    widths: Array = np.maximum(narrowest, gained * steepest / limit)
+    return widths

@@ -150,7 +150,8 @@ class PulseCommand(NamedTuple):
     """What a law asks of on/off thrusters."""
 
     on_time: Array
-    """For how long each is on, from the beginning of the control period [s], shape (..., n)."""
+    """For how long each is on, from the beginning of the control period [s], shape (..., n); of the
+    integration step, where an inner loop commands it."""
 
 
 class Law(Protocol):

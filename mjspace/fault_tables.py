@@ -24,7 +24,7 @@ class Fault(Table):
     value: Finite | None = None
     """Of all kinds but dead and stuck; a number in SI or a quantity."""
     at: Time | None = None
-    """When it begins: at the first control period that is not before."""
+    """When it begins: at the first integration step that is not before."""
     when: Region | None = None
     """Or the first control period in which a signal is inside: one of ``truth`` as ideal sensors
     see it, ``measurement``, ``command`` or ``law``."""

@@ -31,11 +31,17 @@ class _Place:
     columns: list[int]
 
 
+def between(tables: Sequence[Fault], control: float) -> bool:
+    """Tell whether a fault begins or ends between control instants, ``control`` [s] apart."""
+    times = [time for fault in tables for time in (fault.at, fault.until) if time is not None]
+    return any(abs(time - control * round(time / control)) > TICK for time in times)
+
+
 class FaultSet:
     """The faults of a batch of vehicles; all memory is in ``State``.
 
-    A fault begins and ends with a control period. Of several on one motor, each changes what those
-    listed before have left.
+    A fault begins and ends with an integration step; one that looks at a signal begins with a
+    control period. Of several on one motor, each changes what those listed before have left.
     """
 
     def __init__(
@@ -87,11 +93,12 @@ class FaultSet:
         return state
 
     def decide(
-        self, state: State, now: float, seen: Mapping[str, Any]
+        self, state: State, now: float, seen: Mapping[str, Any] | None
     ) -> tuple[State, list[tuple[float, int, str, str]]]:
         """Return the state with what begins and ends at ``now`` [s], and the events of that.
 
-        ``seen`` has the named tuples that a fault's ``when`` may look at, by topic.
+        ``seen`` has the named tuples that a fault's ``when`` may look at, by topic; None between
+        control instants, where none looks.
 
         Raises:
             InputError: a fault looks at a signal that is not there, with the near names.
@@ -144,10 +151,12 @@ class FaultSet:
             return right + value * self._noises[number](index)
         return right + value if kind == "biased" else right * value  # of a dead one by zero
 
-    def _is_due(self, number: int, now: float, seen: Mapping[str, Any]) -> Any:
+    def _is_due(self, number: int, now: float, seen: Mapping[str, Any] | None) -> Any:
         fault = self._tables[number]
         if fault.when is None:
             return now >= (fault.at or 0.0) - TICK
+        if seen is None:
+            return np.bool_(False)
         arrays = {
             f"/{topic}": {n: np.asarray(a) for n, a in values._asdict().items() if np.size(a)}
             for topic, values in seen.items()

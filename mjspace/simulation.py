@@ -105,6 +105,7 @@ class _Flight:
         self.sensordata = self.batch.bind("sensordata")
         self.actuators, self.actuator_state = assembly.actuators, start.actuators
         self.faults = assembly.faults(members)
+        self.timed_faults = self.faults if assembly.faults_between else None
         self.inner = getattr(assembly.law, "inner", None)
         self.returned: Any = None
         self.push = None
@@ -249,12 +250,9 @@ class _Flight:
         return given, saturated
 
     def _weigh(self, masses: list[tuple[str, int, Array]]) -> None:
-        """Give bodies the masses of the middle of the integration step.
-
-        The constants that MuJoCo derives from them take 0.6 of a step's time: they are derived
-        again only where something burns.
-        """
+        """Give bodies the masses of the middle of the integration step; idle where none burns."""
         fields = [(self.batch.expand(name)[:, body], values) for name, body, values in masses]
+        # What MuJoCo derives from masses takes 0.6 of the time of a step.
         if any(not np.array_equal(field, values) for field, values in fields):
             for field, values in fields:
                 field[:] = values
@@ -277,6 +275,10 @@ class _Flight:
                     seen = self._measure(first_step + step, truth)
                 if self.push is not None:
                     self.push(now, physics, truth)
+                if self.timed_faults is not None:
+                    state = self.actuator_state
+                    self.actuator_state, begun = self.timed_faults.decide(state, now, None)
+                    tape.happened += begun
                 if self.driven_stepwise:
                     _, saturated = self._drive(now, command, seen, truth)
                     tape.saturated[-1] = np.maximum(tape.saturated[-1], saturated)

@@ -24,16 +24,17 @@ TICK = 1e-12
 class Thrusters:
     """On/off thrusters that obey a ``PulseCommand``.
 
-    A pulse begins a ``delay`` after its control period does; one that lasts its whole period joins
-    the next. A valve that has opened stays open for ``minimum_on``: what is asked for is lengthened
-    and not dropped. Each integration step has the impulse that valve and lag give it, exactly.
+    A pulse begins a ``delay`` after its control period does, or the integration step for which an
+    inner loop commands it; one that lasts its whole period joins the next. A valve that has opened
+    stays open for ``minimum_on``: a shorter command is lengthened and not dropped. Each integration
+    step has the impulse that valve and lag give it, exactly.
     """
 
     data: Array
     """The thrusters' numbers, in the order that the kernel reads them."""
     count: int
     memory: int
-    """How many control periods' commands may still be on their way to the valves."""
+    """How many commands may still be on their way to the valves."""
     tank: int
     """The body whose mass is the propellant's; 0: none burns."""
     full: Array
@@ -46,16 +47,20 @@ class Thrusters:
     stateful: ClassVar[bool] = True
 
     @classmethod
-    def of(cls, vehicle: Vehicle, table: Rcs, rates: Rates) -> Self:
-        """Return the thrusters of a vehicle that was composed with them."""
+    def of(cls, vehicle: Vehicle, table: Rcs, rates: Rates, *, inner: bool = False) -> Self:
+        """Return the thrusters of a vehicle that was composed with them.
+
+        With ``inner`` the law's inner loop commands them, anew in every integration step.
+        """
+        period, steps = (rates.physics, 1) if inner else (rates.control, rates.steps)
         flow, tank, full = 0.0, 0, np.zeros(3)
         if table.specific_impulse is not None:
             flow = 1.0 / (table.specific_impulse * STANDARD_GRAVITY)
             tank = vehicle.model.body("rcs_tank").id
             full = vehicle.model.body_inertia[tank] / table.propellant
         valve = [table.minimum_on, table.delay, table.rise]
-        data = np.array([table.thrust, flow, *valve, rates.control, float(rates.steps)])
-        memory = 1 + ceil(table.delay / rates.control - 1e-9)
+        data = np.array([table.thrust, flow, *valve, period, float(steps)])
+        memory = 1 + ceil(table.delay / period - 1e-9)
         return cls(data, len(table.positions), memory, tank, full, table.propellant or 0.0)
 
     @property

@@ -162,3 +162,92 @@ def test_wheels_that_span_too_little_say_so_and_are_saturated(tmp_path: Path) ->
     with pytest.warns(ModelWarning):
         built = assemble(*load(path, ["law.torque=[0, 0, 1e-4]", "duration=2"]))
     assert not flown(built)[1]
+
+
+def test_a_fault_begins_and_ends_with_an_integration_step(tmp_path: Path) -> None:
+    path = satellite(tmp_path, "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]")
+    fault = "faults=[{motor='wheel_2', kind='dead', at='0.33 s', until='1.57 s'}]"
+    rows, events = flown(assemble(*load(path, [fault, "law.torque=[0, 0, -3e-5]", "duration=3"])))
+    # dead for 1.24 s of 3: J W' = 3e-5 N m against a bus of 0.03 kg m^2
+    inertia = 3e-6 * 0.03 / 0.030003
+    spun = rows["/truth"]["wheel_speed"][-1, 2] * inertia
+    assert spun == pytest.approx(3e-5 * (3.0 - 1.24), rel=1e-3)  # of the bus's other inertia
+    assert [time for time, *_ in events] == pytest.approx([0.33, 1.57])
+
+
+RELAY = [
+    *("checks=[]", "duration=0.6", "rates.physics='1 ms'", "initial.euler=[0, 1e-4, 0]"),
+    *("initial.rate=[0, 2e-3, 0]", "plant.rcs.delay='50 ms'", "plant.rcs.minimum_on='3 ms'"),
+]
+
+
+@pytest.mark.parametrize("control", ["10 ms", "0.1 s"])
+def test_relays_do_not_know_the_control_period(control: str) -> None:
+    often, seldom = (
+        flown(assemble(*load("rcs-sliding", [*RELAY, f"rates.control='{period}'"])))[0]["/truth"]
+        for period in ("1 ms", control)
+    )
+    every = (len(often["rate"]) - 1) // (len(seldom["rate"]) - 1)
+    assert np.count_nonzero(np.diff(np.sign(often["thrust"][:, 4]))) >= 4  # it switches
+    for name, values in seldom.items():
+        np.testing.assert_array_equal(values, often[name][::every], err_msg=name)
+
+
+def test_relays_follow_a_reference_that_turns_between_control_instants() -> None:
+    turning = ["reference={kind='references:Slew', attitude=[0.999, 0, 0.0447, 0], duration='1 s'}"]
+    settings = [*RELAY, *turning, "plant.rcs.thrust=5"]
+    often, seldom = (
+        flown(assemble(*load("rcs-sliding", [*settings, f"rates.control='{period}'"])))[0]
+        for period in ("1 ms", "20 ms")
+    )
+    # What the relays do not know is how the acceleration changes in 20 ms; 2e-3 with it unknown.
+    off = often["/truth"]["attitude"][::20] - seldom["/truth"]["attitude"]
+    turned = often["/truth"]["attitude"][-1] - often["/truth"]["attitude"][0]
+    assert np.abs(turned).max() > 1e-2
+    assert np.abs(off).max() < 3e-4  # 2.1e-4 measured
+
+
+@pytest.mark.parametrize("step", [4.0, 1.0])
+def test_a_relay_is_late_by_half_an_integration_step(step: float) -> None:
+    # A swing from and to 5 deg: U |a| + a'^2/2 grows by 2 U (h/2) |a'| at each of two switches,
+    # relatively by 2 h |a'| / a0: 7.83e-3 at 4 ms and 1.93e-3 at 1 ms measured.
+    settings = ["checks=[]", "duration=8.4", f"rates.physics='{step} ms'", "rates.control='20 ms'"]
+    rows, _ = flown(assemble(*load("rcs-centre", settings)))
+    start = np.radians(5.0)
+    growth = rows["/law"]["angle"][300:, 0].max() / start - 1.0
+    assert growth == pytest.approx(2.0 * 1e-3 * step * 0.085277 / start, rel=0.02)
+
+
+NOISY = """
+from typing import NamedTuple
+import numpy as np
+from mjspace.contract import TorqueCommand
+
+class State(NamedTuple):
+    reading: np.ndarray
+
+class Command(NamedTuple):
+    none: np.ndarray
+
+class Inner:
+    batched = True
+    def reset(self, measurement, reference):
+        return State(np.zeros_like(measurement.rate))
+    def step(self, state, time, measurement, reference):
+        return state, Command(np.zeros_like(measurement.rate)), Command(measurement.rate)
+    def inner(self, state, time, command, measurement):
+        return State(measurement.rate), TorqueCommand(1e-3 * measurement.rate)
+"""
+
+
+def test_an_inner_loop_sees_the_sensors_and_not_the_truth(tmp_path: Path) -> None:
+    path = satellite(tmp_path, "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]")
+    (tmp_path / "noisy.py").write_text(NOISY)
+    sensor = ["sensors.rate={noise='0.01 rad/s', period='20 ms'}", "law={kind='noisy.py:Inner'}"]
+    rows, _ = flown(assemble(*load(path, [*sensor, "duration=1", "rates.control='0.1 s'"])))
+    # The state is what the inner loop was shown last, in the step before: the newest sample.
+    shown = rows["/state"]["law_reading"][1:]
+    true = rows["/truth"]["rate"][1:]
+    assert 0.005 < (shown - true).std() < 0.02
+    # It is the sample that was taken at 80 ms of the period, and not that of the control instant.
+    assert np.abs(shown - rows["/measurement"]["rate"][:-1]).min() > 0.0

@@ -151,6 +151,6 @@ def test_what_cannot_fly_is_refused(tmp_path: Path) -> None:
     drive = "{pole_pairs=1, resistance=1, inductance=1, torque_constant=1}"
     with pytest.raises(InputError, match="drives and servos are both given: give one"):
         load("cmg-slew", [f"plant.drives.cmg_0_wheel={drive}"])
-    message = r"the law's command has no gimbal_rate of shape \(\.\.\., 4\) \[rad/s\]"
+    message = r"no field 'gimbal_rate': it must be of shape \(\.\.\., 4\) \[rad/s\]"
     with pytest.raises(FlightError, match=message):
         run("cmg-slew", overrides=[*QUICK, "law={kind='coast:Coast'}"], out=tmp_path)

@@ -155,6 +155,6 @@ def test_what_cannot_fly_is_refused(scenario: str, override: str, message: str) 
 
 def test_a_law_without_voltages_is_told_so(tmp_path: Path) -> None:
     overrides: list[Any] = [*QUIET, "law={kind='coast:Coast'}"]
-    message = r"the law's command has no voltage of shape \(\.\.\., motors, 2\) \[V\]"
+    message = r"no field 'voltage': it must be of shape \(\.\.\., 3, 2\) \[V\]"
     with pytest.raises(FlightError, match=message):
         run("dgvscmg-tracking", overrides=overrides, out=tmp_path)

@@ -198,8 +198,8 @@ def test_trouble_ends_the_flight_and_keeps_every_good_period(
     ("trouble", "message"),
     [
         ("at once", "t = 0 s: the law raised ZeroDivisionError"),
-        ("no torque", "t = 0 s: the law's command has no torque"),
-        ("two", "t = 0 s: the law's command has no torque of shape"),
+        ("no torque", "t = 0 s: the law's command, a Signals, has no field 'torque'"),
+        ("two", "t = 0 s: the law's command: torque has shape (..., 2): it must"),
     ],
 )
 def test_a_law_that_cannot_be_flown_is_told_so(law: Path, trouble: str, message: str) -> None:

@@ -1,5 +1,6 @@
 """The cascade of the double-gimbal CMG: its own arithmetic; that it flies is shown on the plant."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -97,6 +98,31 @@ def test_a_slower_speed_loop_holds_the_currents_that_it_wants() -> None:
     assert np.flatnonzero(changed).tolist() == [0, 5, 10]
     gained = state.wheel_wanted - law.reset(measurement, AT_REST).wheel_wanted
     np.testing.assert_allclose(gained, 1.5e-3 * command.acceleration[:, 2:], rtol=1e-11)
+
+
+@pytest.mark.parametrize("steps", [1, 5])
+def test_it_feeds_the_vibration_back_as_far_ahead_as_its_current_loop_lags(steps: int) -> None:
+    law = cascade(speed_steps=steps, vibration_gain=5.0, observer_gain=1.0, adaptation_gain=1.0)
+    lag = 1.0 / law.current_gain + 0.5 * (steps - 1) * law.inner_period
+    assert lag > 1e-4
+    state, command, _, _ = flown(law, seen(1))
+    random = np.random.default_rng(3)
+    memory = np.abs(random.normal(size=state.speed_memory.shape))  # a vibration is believed in
+    speed, current = 30.0 + random.normal(size=(1, 3)), random.normal(size=(1, 3, 2))
+    right, late, flying = (
+        held_current(
+            loop.step(
+                memory, current, speed, speed, command.acceleration, command.load, 0.0 * speed
+            )[0]
+        )
+        for loop in (
+            replace(law._speed_loop, lead=lag),
+            replace(law._speed_loop, lead=0.0),
+            law._speed_loop,
+        )
+    )
+    np.testing.assert_array_equal(flying, right)
+    assert np.abs(late - right).max() > 1e-3  # A
 
 
 def test_limits_hold_whatever_is_measured() -> None:

@@ -1,7 +1,7 @@
 """Laws of the phase plane against their closed forms, each on an exact double integrator.
 
 A body on a frictionless axis takes the law's on-times exactly: thrust is constant while it lasts.
-Measured: periods and amplitudes come out within 0.4 %: the loop is late by half its period.
+Measured: periods and amplitudes come out within 0.4 %: a relay is late by half an integration step.
 """
 
 from collections.abc import Callable
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mjspace.controllers import phase_plane as laws
+from mjspace.controllers.relays import State
 from mjspace.controllers.turn_kernels import turn
 
 from mjspace import attitude as att
@@ -35,7 +36,7 @@ PLANT: dict[str, Any] = {
 
 def law(kind: Callable[..., Any], period: float = 1e-3, **gains: Any) -> Any:
     """Return a law about y alone."""
-    return kind(**PLANT, axes=Y[None], control_period=period, **gains)
+    return kind(**PLANT, axes=Y[None], control_period=0.5, inner_period=period, **gains)
 
 
 def seen(angle: float, rate: float) -> Measurement:
@@ -48,14 +49,19 @@ def fly(
 ) -> tuple[Array, Array]:
     """Return (rows of t, a, a', which way it fires; total on-time of both senses [s]).
 
-    ``push`` [rad/s^2] is from outside; the command acts ``late`` control periods later.
+    ``push`` [rad/s^2] is from outside; the command acts ``late`` integration steps later.
     """
-    period, rows = flown.control_period, []
+    period, rows = flown.inner_period, []
     state = flown.reset(seen(angle, rate), HOLD)
     total, waiting = np.zeros(2), [np.zeros(12)] * late
     for k in range(round(duration / period)):
-        state, command, signals = flown.step(state, k * period, seen(angle, rate), HOLD)
-        rows.append((k * period, angle, rate, signals.firing[0]))
+        if k % round(flown.control_period / period) == 0:
+            state, aim, signals = flown.step(state, k * period, seen(angle, rate), HOLD)
+        state, command = flown.inner(state, k * period, aim, seen(angle, rate))
+        fired = np.sign(command.on_time[4] - command.on_time[6])
+        if k % round(flown.control_period / period) == 0:
+            assert signals.firing[0] == fired
+        rows.append((k * period, angle, rate, fired))
         waiting.append(command.on_time)
         given = waiting.pop(0)[[4, 6]]
         total += given
@@ -74,9 +80,9 @@ def crossings(rows: Array, column: int = 1) -> Array:
 
 
 def test_thrusters_and_inertia_make_the_acceleration() -> None:
-    flown = laws.Centre(**PLANT, control_period=1e-3)
+    flown = laws.Centre(**PLANT, control_period=0.1, inner_period=1e-3)
     np.testing.assert_allclose(flown.acceleration, [0.4 / 15.0, U, 0.4 / 18.0], rtol=1e-12)
-    _, command, _ = law(laws.Centre).step(laws.State(np.zeros((1, 1))), 0.0, seen(-0.1, 0.0), HOLD)
+    _, command, _ = law(laws.Centre).step(State(np.zeros((1, 1))), 0.0, seen(-0.1, 0.0), HOLD)
     np.testing.assert_allclose(command.on_time, 1e-3 * (np.eye(12)[4] + np.eye(12)[5]), atol=1e-15)
 
 
@@ -128,7 +134,7 @@ def test_minimum_time_arrives_on_time(angle: float, rate: float) -> None:
     flown = law(laws.MinimumTime, 2e-3)
     rows, _ = fly(flown, angle, rate, least + 0.5)
     off = np.flatnonzero(rows[:, 3] == 0.0)
-    assert rows[off[0], 0] == pytest.approx(least, abs=flown.control_period)
+    assert rows[off[0], 0] == pytest.approx(least, abs=flown.inner_period)
     assert (rows[off[0] :, 3] == 0.0).all()
     assert np.count_nonzero(np.diff(rows[:, 3])) == 2
     assert abs(rows[off[0], 1]) < 1e-3
@@ -190,7 +196,8 @@ def test_a_pulse_outlasts_control_periods_and_ends_within_one() -> None:
     flown = law(laws.MinimumImpulse, 0.01, dead_zone=0.01, pulse=0.025)
     state, fired = flown.reset(seen(0.02, 0.001), HOLD), []
     for rate in (0.001, -0.001, -0.001, -0.001):
-        state, command, _ = flown.step(state, 0.0, seen(0.02, rate), HOLD)
+        _, aim, _ = flown.step(state, 0.0, seen(0.02, rate), HOLD)
+        state, command = flown.inner(state, 0.0, aim, seen(0.02, rate))
         fired.append(command.on_time[6])
     np.testing.assert_allclose(fired, [0.01, 0.01, 0.005, 0.0], atol=1e-12)
 
@@ -208,13 +215,14 @@ def test_a_disturbance_makes_the_cycle_one_sided(side: float) -> None:
     assert total[1 if side < 0.0 else 0] == 0.0
 
 
+SLOW: dict[str, Any] = {**PLANT, "control_period": 0.1, "inner_period": 0.1}
 EVERY = [
-    laws.Centre(**PLANT, control_period=0.1),
-    laws.Sliding(**PLANT, control_period=0.1),
-    laws.MinimumTime(**PLANT, control_period=0.1),
-    laws.MinimumFuel(**PLANT, control_period=0.1, final_time=100.0),
-    laws.Schmitt(**PLANT, control_period=0.1, threshold=0.1, hysteresis=0.02, rate_gain=1.0),
-    laws.MinimumImpulse(**PLANT, control_period=0.1, dead_zone=0.1, pulse=0.25),
+    laws.Centre(**SLOW),
+    laws.Sliding(**SLOW),
+    laws.MinimumTime(**SLOW),
+    laws.MinimumFuel(**SLOW, final_time=100.0),
+    laws.Schmitt(**SLOW, threshold=0.1, hysteresis=0.02, rate_gain=1.0),
+    laws.MinimumImpulse(**SLOW, dead_zone=0.1, pulse=0.25),
 ]
 
 
@@ -228,13 +236,17 @@ def test_a_batch_is_its_vehicles_and_a_step_changes_nothing(flown: Any) -> None:
     state = flown.reset(many, HOLD)
     for k in range(4):
         other = Measurement(-many.attitude, many.rate, many.wheel_speed)
-        after, command, signals = flown.step(state, 0.1 * k, many, HOLD)
-        _, same, _ = flown.step(state, 0.1 * k, other, HOLD)
+        _, aim, signals = flown.step(state, 0.1 * k, many, HOLD)
+        after, command = flown.inner(state, 0.1 * k, aim, many)
+        np.testing.assert_array_equal(command.on_time, aim.on_time)
+        _, same = flown.inner(state, 0.1 * k, aim, other)
         np.testing.assert_array_equal(command.on_time, same.on_time)
         for i in range(4):
             one = Measurement(*(array[i] for array in many[:3]))
-            _, alone, shown = flown.step(laws.State(state.memory[i]), 0.1 * k, one, HOLD)
-            np.testing.assert_array_equal(command.on_time[i], alone.on_time)
+            alone = State(state.memory[i])
+            _, aim_of_one, shown = flown.step(alone, 0.1 * k, one, HOLD)
+            _, pulses = flown.inner(alone, 0.1 * k, aim_of_one, one)
+            np.testing.assert_array_equal(command.on_time[i], pulses.on_time)
             np.testing.assert_array_equal(signals.firing[i], shown.firing)
         state = after
     assert (command.on_time >= 0.0).all()
@@ -262,4 +274,4 @@ def test_what_no_law_can_use_is_refused() -> None:
         law(laws.Schmitt, threshold=0.01, hysteresis=0.02, rate_gain=1.0)
     weak = PLANT | {"thruster_force": np.array([*[0.5] * 6, *[0.4] * 6])}
     with pytest.raises(ValueError, match=r"\[0.5\] N m one way, \[0.4\] N m the other"):
-        laws.Centre(**weak, axes=Y[None], control_period=0.1)
+        laws.Centre(**weak, axes=Y[None], control_period=0.1, inner_period=0.1)
