@@ -1,4 +1,4 @@
-"""What is derived from a flight's state: each number of /truth at a known state, and good blocks."""
+"""What is derived from a flight's state: numbers of /truth at a known state, and good blocks."""
 
 from types import SimpleNamespace
 from typing import Any
