@@ -1,7 +1,7 @@
 # The set-up happens by itself, once, and again when what it reads changes.
 bin := .venv/bin
 
-.PHONY: run test flights lint format validation constraints clean
+.PHONY: run test flights mutation lint format validation constraints clean
 
 run: .venv/run.done
 	$(bin)/mjspace run contraction-adaptive --plot --video
@@ -12,6 +12,10 @@ test: .venv/dev.done
 # Every scenario from its beginning to its end, and the campaigns: about a quarter of an hour.
 flights: .venv/dev.done
 	$(bin)/python -m pytest -n 2 -m long
+
+# Which changes of the modules that carry trust no test notices: of each, 40 at random; an hour.
+mutation: .venv/dev.done
+	nice $(bin)/python tools/mutation.py --sample 40
 
 lint: .venv/dev.done
 	$(bin)/ruff check

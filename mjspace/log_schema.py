@@ -46,8 +46,8 @@ def channels(
 ) -> tuple[list[Schema], list[Channel]]:
     """Return the records that declare ``topics``, then /tf, /scene, /events and /robot_description.
 
-    A periodic channel's metadata has ``shape.<field>`` ("9,9"; empty for a number) and, where
-    ``units`` has one, ``unit.<field>``.
+    A periodic channel's metadata has, of each field, ``shape.<field>`` ("9,9"; empty for a number)
+    and, where ``units`` has one, ``unit.<field>``.
 
     Raises:
         ValueError: a topic that the log does not have.
@@ -67,7 +67,8 @@ def channels(
         if topic not in PERIODIC:
             raise ValueError(f"no topic {topic!r}: have {', '.join(PERIODIC)}")
         metadata = {f"shape.{name}": ",".join(map(str, shape)) for name, shape in fields.items()}
-        metadata |= {f"unit.{name}": unit for name, unit in units.get(topic, {}).items()}
+        known = units.get(topic, {})
+        metadata |= {f"unit.{name}": known[name] for name in fields if name in known}
         declare(topic, PERIODIC[topic], "protobuf", _descriptor(PERIODIC[topic], fields), metadata)
     for topic, message in _FOXGLOVE.items():
         described = message.DESCRIPTOR

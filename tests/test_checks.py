@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mjspace.checks import judge, refuse_unknown
+from mjspace.checks import find_signal, judge, refuse_unknown
 from mjspace.errors import InputError
 from mjspace.scenario import Check, Event
 
@@ -228,3 +228,31 @@ def test_windows_are_counted_from_events(window: dict[str, str], value: float) -
     verdict = judge(Tape(ERROR, RATE), [check], [SMALL, LOW, NEVER])[0]
     assert verdict.measured == pytest.approx(value, nan_ok=True)
     assert verdict.outcome == ("not measured" if np.isnan(value) else "PASS")
+
+
+def test_the_line_has_both_bounds_and_a_relative_target_its_scale() -> None:
+    both = Check(name="x", signal="truth.error", below=4.0, above=-2.5)
+    verdict = judge(Tape(ERROR, RATE), [both])[0]
+    assert verdict.bound == "< 4 and > -2.5"
+    assert verdict.line == "PASS x: 3 (required < 4 and > -2.5)"
+    one = Check(name="x", signal="truth.error", above=3.5)
+    assert judge(Tape(ERROR, RATE), [one])[0].line == "FAIL x: 3 (required > 3.5)"
+
+
+def test_a_target_of_one_number_is_of_each_component() -> None:
+    check = Check(name="x", signal="truth.rate", below=1, target=[5.0], statistic="final")
+    refuse_unknown([check], Tape.topics)
+    last = RATE[-1] - 5.0
+    assert judge(Tape(ERROR, RATE), [check])[0].measured == pytest.approx(np.linalg.norm(last))
+
+
+@pytest.mark.parametrize(
+    ("signal", "part"), [("truth.m", (0, 6)), ("truth.m[4]", (4, 5)), ("truth.m[2:6]", (2, 6))]
+)
+def test_a_matrix_is_its_numbers_row_by_row(signal: str, part: tuple[int, int]) -> None:
+    topics = {"/truth": {"m": (2, 3), "n": ()}}
+    assert find_signal(topics, signal) == ("/truth", "m", slice(*part))
+    assert find_signal(topics, "truth.n") == ("/truth", "n", slice(0, 1))
+    for wrong in ("truth.m[6]", "truth.m[3:3]", "truth.m[2:7]"):
+        with pytest.raises(ValueError, match="6 components"):
+            find_signal(topics, wrong)

@@ -11,9 +11,10 @@ from mjspace.assembly import assemble
 from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.fault_tables import Fault
-from mjspace.faults import FaultSet
+from mjspace.faults import STREAM, FaultSet
 from mjspace.flight import run
 from mjspace.loading import load
+from mjspace.noise import normals
 from mjspace.reaction_wheels import ReactionWheels
 from mjspace.replay import verify
 from mjspace.simulation import fly
@@ -74,6 +75,49 @@ def test_noise_is_of_that_size_and_a_members_own() -> None:
     assert abs(np.mean(noise)) < 0.006
     assert abs(np.mean(noise[1:] * noise[:-1])) < 6e-4  # white
     np.testing.assert_array_equal(given(1, kind="noisy", value=0.1, at=0.0)[0][:, 0], rows[:, 0])
+
+
+def test_noise_is_of_a_stream_that_no_sensor_has() -> None:
+    """Its numbers are those of ``normals`` for seed 3 and stream 1000 + the fault's number."""
+    rows, _ = given(2, kind="noisy", value=0.1, at=0.0)
+    expected = normals(3, range(2), (STREAM,), 1)
+    for k, row in enumerate(rows):
+        np.testing.assert_array_equal(row[:, 1:2], RIGHT[k, 1] + 0.1 * expected(k))
+    wheels = [ReactionWheels(np.eye(3))]
+    tables = [Fault(motor=motor, kind="noisy", value=1.0, at=0.0) for motor in MOTORS[:2]]
+    faults = FaultSet(tables, wheels, MOTORS, HOLD, seed=3, members=[0])
+    state, _ = faults.decide(faults.reset(), 0.0, {})
+    _, (row,) = faults.change(state, (np.zeros((1, 3)),), 0.0)
+    assert row[0, 1] == normals(3, [0], (STREAM + 1,), 1)(0)[0, 0]
+    assert row[0, 0] != row[0, 1]
+
+
+def test_a_fault_begins_when_any_topic_says_so() -> None:
+    """Of a vector counts the norm, of some components theirs, and of each vehicle its own."""
+    seen = {"truth": SimpleNamespace(_asdict=lambda: {"rate": np.array([[3.0, 4.0], [3.0, 0.0]])})}
+    for signal, began in (("truth.rate", [0]), ("truth.rate[0]", []), ("truth.rate[1]", [0])):
+        fault = Fault.model_validate(
+            {"motor": "wheel_0", "kind": "dead", "when": {"signal": signal, "above": 3.5}}
+        )
+        faults = FaultSet([fault], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0, 1])
+        _, happened = faults.decide(faults.reset(), 0.0, seen)
+        assert [vehicle for _, vehicle, *_ in happened] == began, signal
+
+
+def test_axes_of_a_torque_on_the_bus_are_its_motors() -> None:
+    thrusters: Any = SimpleNamespace(acts_on="qfrc_applied", logged_as="thruster_torque")
+    kinds: Any = [thrusters]
+    for name in ("thruster_torque", *(f"thruster_torque[{k}]" for k in range(3))):
+        fault = Fault(motor=name, kind="scaled", value=2.0, at=0.0)
+        faults = FaultSet([fault], kinds, [], HOLD, 0, [0])
+        state, _ = faults.decide(faults.reset(), 0.0, {})
+        _, (torque,) = faults.change(state, (np.ones((1, 3)),), 0.0)
+        expected = np.ones(3)
+        expected[int(name[-2]) if name.endswith("]") else slice(None)] = 2.0
+        assert torque.tolist() == [expected.tolist()]
+    for unknown in ("thruster_torque[3]", "wheel_0", ""):
+        with pytest.raises(ValueError, match=r"faults\.0\.motor: none is called"):
+            FaultSet([Fault(motor=unknown, kind="dead", at=0.0)], kinds, [], HOLD, 0, [0])
 
 
 def test_several_faults_act_one_after_the_other_on_any_kind_of_actuator() -> None:

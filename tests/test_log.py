@@ -10,10 +10,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from log_samples import ATTACHMENTS, BLOCKS, METADATA, UNITS, create, fly, rows, write_block
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.contract import Array
 from mjspace.log_chunk import encode
-from mjspace.log_layout import Fields, doubles
+from mjspace.log_layout import Fields, doubles, varint5
 from mjspace.log_reader import Log
 from mjspace.log_schema import PERIODIC, Scene
 from mjspace.log_writer import LogWriter
@@ -144,6 +146,42 @@ def test_the_nearest_row_is_found_across_chunks(flown: Path, asked: float, found
     assert row["time"] == time[found]
     np.testing.assert_array_equal(row["attitude"], values["/truth"]["attitude"][found])
     assert row["attitude_error"] == values["/truth"]["attitude_error"][found]
+
+
+def test_times_are_refused_one_by_one_and_a_window_may_be_open(tmp_path: Path) -> None:
+    for time in ([0.0, -1e-3], [0.002, 0.002], [0.002, 0.001], [0.0, np.nan]):
+        with create(tmp_path / "refused.mcap") as log:
+            _, values = rows(0, 2)
+            with pytest.raises(ValueError, match=r"do not increase|starts at zero"):
+                log.write(np.array(time), values)
+    with create(tmp_path / "late.mcap") as log:
+        _, values = rows(0, 2)
+        log.write(np.array([0.0, 5e9]), values)  # beyond 2^62 ns, and the log's clock goes to 2^64
+    read = Log(tmp_path / "late.mcap")
+    assert read.read("/truth")["time"].tolist() == [0.0, 5e9]
+    assert read.read("/truth", end=1.0)["time"].tolist() == [0.0]
+    assert read.read("/truth", start=1.0)["time"].tolist() == [5e9]
+
+
+@pytest.mark.parametrize("value", [0, 1, 127, 128, 300, 2**31, 2**35 - 1])
+def test_padded_numbers_are_protobufs(value: int) -> None:
+    (padded,) = varint5(np.array([value], np.uint64))
+    decoded = sum((int(byte) & 0x7F) << 7 * k for k, byte in enumerate(padded))
+    assert decoded == value
+    assert [bool(byte & 0x80) for byte in padded] == [True] * 4 + [False]
+
+
+def test_a_message_of_many_long_fields_is_what_protobuf_reads(tmp_path: Path) -> None:
+    """More than 15 fields and more than 127 bytes in one: numbers of two bytes in its layout."""
+    fields = {f"f{k}": (5, 8) for k in range(40)}
+    values = {name: np.full((1, 5, 8), float(k)) for k, name in enumerate(fields)}
+    with LogWriter(tmp_path / "x.mcap", {"/truth": fields}, {}, {}, Scene((), b"", ""), {}) as log:
+        log.write(np.zeros(1), {"/truth": values})
+    with (tmp_path / "x.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        ((*_, decoded),) = reader.iter_decoded_messages(["/truth"])
+    for k, name in enumerate(fields):
+        assert list(getattr(decoded, name)) == [float(k)] * 40
 
 
 def test_a_kept_column_does_not_keep_its_chunk(flown: Path) -> None:

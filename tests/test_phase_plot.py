@@ -2,15 +2,16 @@
 
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgb
 from PIL import Image
 
 from mjspace.flight import run
 from mjspace.log_reader import Log
 from mjspace.phase_plot import figure, plot
-from mjspace.plot_style import COLORS
+from mjspace.plot_style import COLORS, STYLE
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +48,23 @@ def test_signals_of_no_thruster_may_be_drawn(pictured_log: Path) -> None:
 
 def test_the_file_is_a_picture(flown: Path, tmp_path: Path) -> None:
     plot(flown, tmp_path / "x.png", "law.angle", "law.angle_rate")
-    image = np.asarray(Image.open(tmp_path / "x.png").convert("RGB"))
+    image = np.asarray(Image.open(tmp_path / "x.png").convert("RGB")).astype(int)
     assert image.shape == (780, 975, 3)
-    assert 0.8 < (image == 255).all(axis=2).mean() < 0.99
+    # The same page drawn here says where the path and its ends are; they have their colours there.
+    with matplotlib.rc_context(STYLE):
+        page = figure(Log(flown), "law.angle", "law.angle_rate")
+        page.set_dpi(130)
+        page.canvas.draw()
+    axes = page.axes[0]
+    lines = {line.get_label(): line for line in axes.lines}
+    for label, part in (("end", 0), ("thrusters 6, 7", 0.5)):
+        line = lines[label]
+        places = axes.transData.transform(np.column_stack(line.get_data()))
+        places = places[np.isfinite(places).all(axis=1)]
+        x, y = places[int(part * len(places))]
+        near = image[779 - int(y) - 2 : 779 - int(y) + 3, int(x) - 2 : int(x) + 3].reshape(-1, 3)
+        color = 255 * np.array(to_rgb(line.get_color()))
+        assert np.abs(near - color).max(axis=1).min() < 12, label  # smoothed at the edge
 
 
 def test_bad_input_is_refused(flown: Path, tmp_path: Path) -> None:

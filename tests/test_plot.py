@@ -66,6 +66,54 @@ def test_angles_are_in_degrees_and_rates_have_their_reference(page: Figure, log:
         assert np.max(line) == pytest.approx(component.max(), rel=1e-12)
 
 
+SI = 1.0
+EACH_PANEL = [
+    ("/truth", "attitude_error", 180.0 / np.pi),
+    ("/truth", "rate", 180.0 / np.pi),
+    ("/command", "torque", SI),
+    ("/command", "wheel_torque", SI),
+    ("/truth", "wheel_speed", 30.0 / np.pi),
+    ("/truth", "momentum", SI),
+    ("/disturbance", "torque", SI),
+]
+
+
+@pytest.mark.parametrize("number", range(len(EACH_PANEL)))
+def test_each_panel_shows_its_signal_in_its_unit(number: int, page: Figure, log: Log) -> None:
+    """Of each component a line, in its order, of logged points that lack at most every other."""
+    topic, field, scale = EACH_PANEL[number]
+    read = log.read(topic, [field])
+    values = scale * read[field]
+    if field == "momentum":
+        values = np.linalg.norm(values - values[0], axis=1, keepdims=True)
+    assert len(values) == 1001
+    drawn = [
+        line
+        for line in page.axes[number].lines
+        if len(np.asarray(line.get_xdata())) >= 1001 and line.get_alpha() is None
+    ]
+    assert len(drawn) == values.shape[1]
+    for component, line in zip(values.T, drawn, strict=True):
+        x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+        rows = np.searchsorted(read["time"], x)
+        assert rows[0] <= 1
+        assert rows[-1] >= 999
+        assert np.diff(rows).max() <= 3
+        np.testing.assert_allclose(y, component[rows], rtol=1e-12)
+
+
+def test_each_signal_of_the_law_is_drawn_as_logged(page: Figure, log: Log) -> None:
+    for number in range(7, len(titles(page))):
+        field = titles(page)[number].removeprefix("Law: ")
+        read = log.read("/law", [field])
+        values = read[field].reshape(1001, -1)
+        lines = [x for x in page.axes[number].lines if len(np.asarray(x.get_xdata())) >= 1001]
+        assert len(lines) == values.shape[1]
+        for component, line in zip(values.T, lines, strict=True):
+            rows = np.searchsorted(read["time"], np.asarray(line.get_xdata()))
+            np.testing.assert_array_equal(np.asarray(line.get_ydata()), component[rows])
+
+
 def test_change_of_momentum_starts_at_zero(page: Figure, log: Log) -> None:
     change = np.asarray(page.axes[5].lines[0].get_ydata())
     assert change[0] == 0.0

@@ -65,13 +65,23 @@ def row(pictured_log: Path) -> Any:
     return Log(pictured_log).read("/state", ["physics"], end=0.0)["physics"][0]
 
 
+def roughness(image: Pixels) -> float:
+    """Return how neighbours differ, over how any two pixels do: 1 of noise, 0 of one colour."""
+    steps = np.diff(image, axis=1).astype(float)
+    return float(np.sqrt(np.mean(steps**2) / (2.0 * image.var())))
+
+
 @needs_opengl
 def test_a_still_shows_a_scene(still: Callable[..., Pixels]) -> None:
     image = still(0.5)
     assert image.shape == (SIZE[1], SIZE[0], 3)
     # Black space, a bright sunlit side, and textures between: 10379 and 59 were measured.
-    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 1000
-    assert image.std() > 20
+    assert 3000 < len(np.unique(image.reshape(-1, 3), axis=0)) < 30000
+    assert 30 < image.std() < 90
+    # Neighbours are alike but at edges, which noise of the same colours is not: see below.
+    assert roughness(image) < 0.5
+    rng = np.random.default_rng(1)
+    assert roughness(rng.permuted(image.reshape(-1, 3), axis=0).reshape(image.shape)) > 0.9
 
 
 @needs_opengl
