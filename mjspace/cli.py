@@ -11,6 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from mjspace import graphics
 from mjspace.errors import InputError
 from mjspace.options import Json, LogFile, Out, Plot, Set, Video
 from mjspace.terminal import finish, open_log, print_warning, progress_bar, told_in_one_line
@@ -29,6 +30,7 @@ def main() -> None:
     """Run the command line; the entry point."""
     warnings.showwarning = print_warning
     with told_in_one_line():
+        graphics.check()
         app()
 
 
@@ -155,7 +157,7 @@ def replay(
         else:
             result = again.replay(
                 log,
-                output_folder(out, f"{logged.metadata['scenario']}-replay"),
+                output_folder(out, f"{logged.metadata.get('scenario', log.stem)}-replay"),
                 start=start,
                 law=component(law, gains) if law else None,
                 progress=progress,
