@@ -84,3 +84,25 @@ def test_the_sample_of_the_start_is_none_and_shares_no_memory() -> None:
     # at rest in gravity of 1 m/s^2 along each axis
     felt = strapdown.take(state, PERIOD, start)
     np.testing.assert_allclose(felt, [[-1.0, -1.0, -1.0]], rtol=1e-12)
+
+
+def test_a_batch_feels_what_each_feels_alone() -> None:
+    rng = np.random.default_rng(3)
+    turned = [attitude.normalize(START + 0.05 * rng.normal(size=(3, 4))) for _ in range(2)]
+    moved = [rng.normal(size=(3, 3)) for _ in range(2)]
+    empty = np.zeros((3, 0))
+
+    def many(k: int, rows: slice) -> Measurement:
+        fields = dict.fromkeys(Measurement._fields, empty[rows])
+        fields |= {"attitude": turned[k], "position": moved[k], "velocity": 2.0 * moved[k]}
+        return Measurement(**{name: field[rows] for name, field in fields.items()})
+
+    strapdown = Strapdown(lambda place: -place, PERIOD, STEP)
+
+    def felt(rows: slice) -> Array:
+        state: dict[str, Array] = {}
+        strapdown.reset(state, many(0, rows))
+        return strapdown.take(state, PERIOD, many(1, rows))
+
+    alone = np.concatenate([felt(slice(i, i + 1)) for i in range(3)])
+    np.testing.assert_array_equal(felt(slice(0, 3)), alone)

@@ -72,7 +72,7 @@ def test_the_verdict_is_the_exit_status(
                 faults=[injected],
                 motion=[],
                 errors={},
-                **section,  # type: ignore[arg-type]
+                **section,
             )
         ],
     )
