@@ -12,6 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from mjspace import graphics
 from mjspace.errors import InputError
 from mjspace.options import Json, LogFile, Out, Plot, Set, Traceback, Video
 from mjspace.terminal import (
@@ -37,6 +38,7 @@ def main() -> None:
     """Run the command line; the entry point."""
     warnings.showwarning = print_warning
     with told_in_one_line():
+        graphics.check()
         app()
 
 
@@ -166,7 +168,7 @@ def replay(
         else:
             result = again.replay(
                 log,
-                output_folder(out, f"{logged.metadata['scenario']}-replay"),
+                output_folder(out, f"{logged.metadata.get('scenario', log.stem)}-replay"),
                 start=start,
                 law=component(law, gains) if law else None,
                 progress=progress,

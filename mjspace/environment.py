@@ -21,7 +21,7 @@ from mjspace.tables import Ripple
 
 SENSOR = "environment"
 """Name of the user sensor (6 numbers, needstage "vel") that is given the environment's total on the
-bus: force [N] in world axes, torque [N m] about the bus's origin in body axes."""
+vehicle: force [N] in world axes, torque [N m] about its centre of mass in the bus's body axes."""
 
 _NO_PASSIVE = int(mujoco.mjtDisableBit.mjDSBL_SPRING | mujoco.mjtDisableBit.mjDSBL_DAMPER)
 

@@ -212,7 +212,12 @@ def passive_callback(model_at: ModelOffsets, data_at: DataOffsets) -> Any:
 
 
 def sensor_callback(model_at: ModelOffsets, data_at: DataOffsets) -> Any:
-    """Return the native ``mjcb_sensor`` that copies the bus's six passive forces to its sensor."""
+    """Return the native ``mjcb_sensor`` that gives the bus's sensor the total on the vehicle.
+
+    The bus's six passive forces are a force and a torque about its origin. The torque is moved to
+    the centre of mass of all that moves with it: about a point that it does not turn around, as
+    the bus of a vehicle whose boom grows, a force through the centre of mass would seem to turn it.
+    """
     model_words, data_words = max(model_at) + 1, max(data_at) + 1
 
     @cfunc(types.void(types.voidptr, types.voidptr, types.int32), cache=True, error_model="numpy")
@@ -227,7 +232,12 @@ def sensor_callback(model_at: ModelOffsets, data_at: DataOffsets) -> Any:
         if stage >= _STAGE_VELOCITY and address >= 0:
             forces = floats(d, data_at.qfrc_passive, (nv,))
             readings = floats(d, data_at.sensordata, (address + 6,))
-            for i in range(6):
+            axes = floats(d, data_at.cdof, (nv, 6))
+            for i in range(3):
                 readings[address + i] = forces[dof + i]
+                # about axis i through the bus's origin, the centre of mass moves by s[3:]
+                s = axes[dof + 3 + i]
+                moved = s[3] * forces[dof] + s[4] * forces[dof + 1] + s[5] * forces[dof + 2]
+                readings[address + 3 + i] = forces[dof + 3 + i] - moved
 
     return sensor

@@ -9,6 +9,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 from pyIGRF14.calculate import igrf12syn as synthesis  # of the 14th generation, by its data
+from pyIGRF14.loadCoeffs import get_coeffs
 from scipy.interpolate import CubicSpline
 
 from mjspace import kepler, magnetic_field
@@ -19,6 +20,32 @@ from mjspace.tables import Rates
 
 SPACING = 10.0
 """s at most between the field's samples, which are whole control periods apart."""
+
+
+@dataclass(frozen=True)
+class Dipole:
+    """The Earth's dipole: the terms of degree 1 of the reference field."""
+
+    strength: float
+    """The field on the magnetic equator times the radius cubed [T m^3]."""
+    tilt: float
+    """Of the northern pole from the Earth's axis [rad]."""
+    longitude: float
+    """Of the northern pole, east of Greenwich [rad]."""
+
+
+def dipole_of(epoch: datetime) -> Dipole:
+    """Return the dipole at ``epoch``, UTC, by IGRF-14 (IAGA 2024, doi:10.5281/zenodo.14012302).
+
+    The coefficients of every fifth year are interpolated; reference radius 6371.2 km.
+    """
+    g, h = get_coeffs(_year(epoch))
+    axial, prime, east = (1e-9 * value for value in (g[1][0], g[1][1], h[1][1]))  # T
+    return Dipole(
+        strength=math.hypot(axial, prime, east) * 6371.2e3**3,
+        tilt=math.atan2(math.hypot(prime, east), -axial),
+        longitude=math.atan2(-east, -prime),
+    )
 
 
 @dataclass(frozen=True)
@@ -71,17 +98,19 @@ def along(environment: Environment, rates: Rates, duration: float) -> FieldAlong
 def field_at(table: MagneticField, place: Array, time: Array) -> Array:
     """Return the field [T] at each ``place`` [m] from the centre and ``time`` [s], (n, 3) and (n,).
 
-    Places and field are in inertial axes. The reference field does not age from the epoch on: in a
-    day it changes by 1e-5 of itself.
+    Places and field are in inertial axes. Dipole and reference field are those of the epoch, and do
+    not age from it on: in a day they change by 1e-5 of themselves.
     """
     turned = sidereal_angle(table.epoch)
     if table.model == "dipole":
-        tilt = magnetic_field.EARTH_TILT if table.tilt is None else table.tilt
-        longitude = magnetic_field.EARTH_LONGITUDE + turned
+        earth = dipole_of(table.epoch)
+        tilt = earth.tilt if table.tilt is None else table.tilt
+        longitude = earth.longitude + turned
         rotation = magnetic_field.EARTH_ROTATION
         poles = [magnetic_field.northern_pole(t, tilt, longitude, rotation) for t in time]
-        strength = magnetic_field.EARTH_STRENGTH
-        rows = [magnetic_field.dipole(*both, strength) for both in zip(place, poles, strict=True)]
+        rows = [
+            magnetic_field.dipole(*both, earth.strength) for both in zip(place, poles, strict=True)
+        ]
         return np.array(rows)
     radius = np.sqrt(np.sum(place**2, axis=-1))
     latitude = np.arcsin(place[:, 2] / radius)

@@ -1,6 +1,7 @@
 """What lies where in a log's file, complete or cut short anywhere: a walk over its records."""
 
 import io
+import struct
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from struct import Struct
@@ -9,6 +10,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Metadata, Schema
 
@@ -47,8 +49,15 @@ def inventory(path: Path) -> Inventory:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no MCAP file, or no log of mjspace.
+        ValueError: it is no MCAP file, no log of mjspace, or damaged.
     """
+    try:
+        return _inventory(path)
+    except (McapError, IndexError, struct.error, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is damaged: a record in it cannot be read") from error
+
+
+def _inventory(path: Path) -> Inventory:
     found = Inventory({}, {}, {}, {}, {}, [], complete=False)
     ours = complete = False
     with path.open("rb", buffering=0) as file:

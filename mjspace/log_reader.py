@@ -74,9 +74,8 @@ class Log:
             ValueError: there is none of that name.
         """
         if name not in self._found.attachments:
-            raise ValueError(
-                f"no attachment {name!r} in {self.path}: have {', '.join(self.attachments)}"
-            )
+            have = ", ".join(self.attachments) or "none"
+            raise ValueError(f"no attachment {name!r} in {self.path}: have {have}")
         return read_attachment(self.path, self._found.attachments[name])
 
     def __len__(self) -> int:
@@ -190,10 +189,20 @@ class Log:
             return first["header"][0], last["header"][-1]
         return None
 
+    def require_periods(self) -> None:
+        """Make sure that the log holds something of a flight.
+
+        Raises:
+            ValueError: it was cut short before its first chunk, or has no control period at all.
+        """
+        if self._ends is None:
+            cut = "" if self.complete else " was cut short before its first chunk: it"
+            raise ValueError(f"{self.path}{cut} holds no control period")
+
     @property
     def _some_ends(self) -> tuple[np.void, np.void]:
-        if self._ends is None:
-            raise ValueError(f"{self.path} holds no control period")
+        self.require_periods()
+        assert self._ends is not None
         return self._ends
 
     def _fields(self, topic: str, fields: Sequence[str] | None) -> Sequence[str]:

@@ -5,13 +5,6 @@ from typing import Any
 
 from numba import njit
 
-# Of the Earth: Alken et al. 2021, International Geomagnetic Reference Field, the thirteenth
-# generation; the terms of degree 1 at epoch 2020.0, reference radius 6371.2 km.
-_G10, _G11, _H11 = -29404.8e-9, -1450.9e-9, 4652.5e-9  # T
-
-EARTH_STRENGTH = math.hypot(_G10, _G11, _H11) * 6371.2e3**3  # T m^3
-EARTH_TILT = math.atan2(math.hypot(_G11, _H11), -_G10)  # rad
-EARTH_LONGITUDE = math.atan2(-_H11, -_G11)  # rad, of the northern pole
 EARTH_ROTATION = 7.292115e-5  # rad/s; Moritz 2000, Geodetic Reference System 1980
 
 

@@ -15,8 +15,8 @@ class MagneticField(Table):
     model: Literal["dipole", "igrf"] = "dipole"
     """A tilted dipole at the centre, or the International Geomagnetic Reference Field (IGRF-14)."""
     epoch: datetime = datetime(2025, 1, 1)
-    """Time zero, UTC: which way the Earth has turned by then and, with ``igrf``, of which day the
-    field is; 1900 to 2030."""
+    """Time zero, UTC: which way the Earth has turned by then, and of which day the field is, of the
+    dipole too: IGRF-14 is valid from 1900 to 2030, and other dates are refused."""
     tilt: Annotated[NonNegative, Field(le=math.pi), Si("rad")] | None = None
     """Of the dipole to the Earth's axis; the Earth's own when left out."""
 
@@ -32,7 +32,7 @@ class MagneticField(Table):
     def _known(cls, epoch: datetime) -> datetime:
         universal = epoch.astimezone(UTC).replace(tzinfo=None) if epoch.tzinfo else epoch
         if not 1900 <= universal.year < 2030:
-            raise ValueError(f"{epoch:%Y-%m-%d}: the field is known from 1900 to 2030")
+            raise ValueError(f"{epoch:%Y-%m-%d}: the field (IGRF-14) is known from 1900 to 2030")
         return universal
 
 

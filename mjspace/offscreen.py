@@ -8,6 +8,7 @@ from typing import Any, Self
 import mujoco
 import numpy as np
 
+from mjspace import graphics
 from mjspace.errors import NoRendererError
 from mjspace.video import Frame
 
@@ -27,6 +28,11 @@ class Canvas:
         Raises:
             NoRendererError: no OpenGL context can be had, with what to install.
         """
+        graphics.check()
+        if graphics.is_off():
+            raise NoRendererError(
+                f"MUJOCO_GL={graphics.chosen()} switches rendering off: unset it to render"
+            )
         width, height = size
         model.vis.global_.offwidth, model.vis.global_.offheight = size
         try:

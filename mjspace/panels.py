@@ -58,7 +58,9 @@ STANDARD = (
     Panel("Gimbal rate", "/truth", "gimbal_rate", "rad/s", wanted=("/command", "gimbal_rate")),
     Panel("Wheel speed", "/truth", "wheel_speed", "rpm", RPM),
     Panel("Change of total momentum", "/truth", "momentum", "N m s", log_scale=True, drift=True),
-    Panel("Disturbance torque", "/disturbance", "torque", "N m", names="xyz"),
+    Panel(
+        "Disturbance torque about the centre of mass", "/disturbance", "torque", "N m", names="xyz"
+    ),
 )
 
 

@@ -48,12 +48,14 @@ def finish(result: "Result", plot_it: bool, video: bool, as_json: bool, tracebac
 
 
 def open_log(path: Path) -> "Log":
-    """Return the log at ``path``; InputError when there is none."""
+    """Return the log at ``path``; InputError when there is none, or nothing in it."""
     from mjspace.errors import blamed_on
     from mjspace.log_reader import Log
 
     with blamed_on("log"):
-        return Log(path)
+        log = Log(path)
+        log.require_periods()
+    return log
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from mujoco import batch
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from mjspace import environment
+from mjspace import attitude, environment
 from mjspace.constants import GM
 from mjspace.contract import Array
 from mjspace.environment_kernel import MAGIC
@@ -365,10 +365,44 @@ def test_sensor_reports_the_environment_at_the_start_of_the_step() -> None:
     mujoco.mj_forward(model, data)
     wanted = data.qfrc_passive.copy()
     assert np.abs(wanted).min() > 1e-9
-    np.testing.assert_array_equal(data.sensordata, wanted)
+    # its centre of mass is the bus's origin
+    np.testing.assert_allclose(data.sensordata, wanted, rtol=1e-14)
+    before = data.sensordata.copy()
     mujoco.mj_step(model, data)
-    np.testing.assert_array_equal(data.sensordata, wanted)
+    np.testing.assert_array_equal(data.sensordata, before)
     assert np.abs(data.qfrc_passive - wanted).max() > 1e-3  # that of the last stage
+
+
+BOOM = f"""<mujoco>{OPTION}
+<worldbody><body name="bus"><freejoint/>
+  <inertial pos="0.1 0 0.2" mass="100" diaginertia="8 10 12"/>
+  <body name="boom" pos="0 1 0"><joint name="out" type="slide" axis="0 1 0"/>
+    <inertial pos="0 5 0" mass="2" diaginertia="0.01 0.02 0.02"/></body>
+</body></worldbody>
+<sensor><user name="environment" dim="6" needstage="vel"/></sensor></mujoco>"""
+
+
+@pytest.mark.parametrize("place", [[0.0, 0.0, 0.0], [4.0, -3.0, 2.0]])
+@pytest.mark.parametrize("turned", [[1.0, 0.0, 0.0, 0.0], TUMBLING])
+def test_the_logged_torque_is_about_the_centre_of_mass(
+    place: list[float], turned: list[float]
+) -> None:
+    """Gravity's is 3 n^2 u x I u, I about the centre of mass, wherever the bus has wandered to."""
+    model, data = compiled(BOOM, Environment(orbit=CIRCULAR), step=1.0)
+    data.qpos[:3], data.qpos[3:7] = place, turned
+    mujoco.mj_forward(model, data)
+    masses, places = np.array([100.0, 2.0]), np.array([[0.1, 0.0, 0.2], [0.0, 6.0, 0.0]])
+    arms = places - masses @ places / 102.0
+    squares = np.sum(arms**2, axis=1)[:, None, None] * np.eye(3)
+    outer = arms[:, :, None] * arms[:, None, :]
+    inertia = np.diag([8.01, 10.02, 12.02]) + np.tensordot(masses, squares - outer, 1)
+    up = attitude.rotate(attitude.conjugate(np.array(turned)), np.array([1.0, 0.0, 0.0]))
+    exact = 3.0 * RATE**2 * np.cross(up, inertia @ up)
+    # The field's curvature over 6 m of 7000 km is 1e-6 of 2e-4 N m. About the bus's origin it
+    # would be off by 102 kg n^2 times 5 m and 0.2 m, 1.2e-4 N m.
+    np.testing.assert_allclose(data.sensordata[3:], exact, atol=1e-8)
+    force = data.qfrc_passive[:3]
+    np.testing.assert_array_equal(data.sensordata[:3], force)
 
 
 @pytest.mark.parametrize("foreign", ["no userdata", "other userdata", "another model's"])

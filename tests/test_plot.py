@@ -44,7 +44,7 @@ def test_the_page_has_every_panel(page: Figure, log: Log) -> None:
         "Wheel motor torque [N m]",
         "Wheel speed [rpm]",
         "Change of total momentum [N m s]",
-        "Disturbance torque [N m]",
+        "Disturbance torque about the centre of mass [N m]",
     ]
     signals = shown[7:]
     assert 1 <= len(signals) <= LAW_PANELS

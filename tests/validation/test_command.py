@@ -6,15 +6,17 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 
-from mjspace.validation import basilisk
+from mjspace.validation import basilisk, command
+from mjspace.validation.benchmark import Bound
 from mjspace.validation.benchmarks import ALL
-from mjspace.validation.results import Results
+from mjspace.validation.results import Injected, Results, Row, Section
 
 
 def validate(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "mjspace", "validate", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120)
+    called = [sys.executable, "-m", "mjspace", "validate", *map(str, arguments)]
+    return subprocess.run(called, capture_output=True, text=True, cwd=cwd, timeout=120)
 
 
 def test_a_quick_run_flies_everything_and_passes(tmp_path: Path) -> None:
@@ -50,6 +52,35 @@ def test_a_model_gets_its_passport(tmp_path: Path) -> None:
     told = json.loads(validate("--model", model, "--json").stdout)
     assert told["passed"] is False
     assert told["integrator"] == "EULER"
+
+
+@pytest.mark.parametrize("passed", [True, False])
+def test_the_verdict_is_the_exit_status(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, passed: bool
+) -> None:
+    row = Row.judged(Bound("x", "", 1.0, "because"), 0.5 if passed else 2.0)
+    injected = Injected(fault="sign", meaning="", wanted=True, broken=["x"] if passed else [])
+    section = dict.fromkeys(("title", "shows", "source", "x_label", "y_label", "error_label"), "")
+    results = Results(
+        versions={},
+        quick=True,
+        sections=[
+            Section(
+                name="fake",
+                step=0.1,
+                rows=[row],
+                faults=[injected],
+                motion=[],
+                errors={},
+                **section,
+            )
+        ],
+    )
+    monkeypatch.setattr("mjspace.validation.suite.validate", lambda *_, **__: results)
+    with pytest.raises(typer.Exit) as ended:
+        command.validate(only=["torque-free"], quick=True, out=tmp_path)
+    assert ended.value.exit_code == (0 if passed else 1)
+    assert json.loads((tmp_path / "validation.json").read_text())["passed"] is passed
 
 
 @pytest.mark.parametrize(

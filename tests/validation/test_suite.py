@@ -94,6 +94,89 @@ def test_a_benchmark_that_misses_its_fault_fails() -> None:
     assert not section.passed
 
 
+def test_a_benchmark_that_only_misses_its_fault_fails_the_suite() -> None:
+    """Everything that it measures is right; it is blind to armature alone."""
+    results = suite.validate([replace(FAKE, fly=blind, order=None)], fly_all=here)
+    (section,) = results.sections
+    assert [row.passed for row in section.rows] == [True, True]
+    assert not section.passed
+    assert not results.passed
+    # one that does not claim to catch it is not to blame
+    silent = suite.validate([replace(FAKE, fly=blind, order=None, catches={})], fly_all=here)
+    assert silent.passed
+
+
+def test_one_section_that_fails_fails_the_suite_and_quick_misses_nothing() -> None:
+    good, bad = replace(FAKE, name="good"), replace(FAKE, name="bad", fly=blind, order=None)
+    for both in ([good, bad], [bad, good]):
+        assert not suite.validate(both, fly_all=here).passed
+        # no fault is flown, so none is missed
+        assert suite.validate(both, quick=True, fly_all=here).passed
+    wrong = replace(FAKE, fly=lambda conditions: readings(1.0, 0.25))
+    assert not suite.validate([wrong], quick=True, fly_all=here).passed
+
+
+def test_a_benchmark_that_raises_is_not_passed_over() -> None:
+    def broken(conditions: Conditions) -> Readings:
+        raise FloatingPointError(conditions.step)
+
+    with pytest.raises(FloatingPointError):
+        suite.validate([replace(FAKE, fly=broken)], fly_all=here)
+
+
+def test_a_fault_is_caught_by_what_is_not_a_number_too() -> None:
+    def diverging(conditions: Conditions) -> Readings:
+        good = fourth_order(conditions)
+        return readings(np.nan, 0.25) if conditions.fault else good
+
+    (section,) = validated(diverging).sections
+    assert section.faults[0].broken == ["error"]
+    assert section.missed == []
+
+
+@pytest.mark.parametrize("target", [0.0, 0.25])
+def test_a_bound_admits_its_edges_and_nothing_beyond(target: float) -> None:
+    bound = Bound("x", "", 0.125, "because", target)
+    for side in (-1.0, 1.0):
+        edge = target + side * 0.125
+        assert bound.admits(edge)
+        assert not bound.admits(edge + side * 1e-15)
+    for nowhere in (np.nan, np.inf, -np.inf):
+        assert not bound.admits(nowhere)
+
+
+@pytest.mark.parametrize("error", [0.0, np.nan, np.inf])
+def test_no_order_is_seen_in_errors_that_are_none(error: float) -> None:
+    def flat(conditions: Conditions) -> Readings:
+        measured = error if conditions.step == 0.2 else 1e-7
+        return replace(readings(1e-7, 0.25), values={"error": measured, "rate": 0.25})
+
+    row = validated(flat).sections[0].rows[-1]
+    assert np.isnan(row.measured)
+    assert not row.passed
+
+
+def test_the_plan_is_flown_as_it_should_be() -> None:
+    flown: list[Conditions] = []
+
+    def noting(conditions: Conditions) -> Readings:
+        flown.append(conditions)
+        return fourth_order(conditions)
+
+    told: list[float] = []
+    suite.validate([replace(FAKE, fly=noting)], progress=told.append, fly_all=here)
+    assert [c for c in flown if not c.short] == [
+        Conditions(0.1),
+        Conditions(0.1, integrator="Euler"),
+    ]
+    assert flown[0].short is False, "the longest first"
+    assert {c.step for c in flown if c.short and c.fault is None} == {0.4, 0.2, 0.1}
+    faults = [c.fault for c in flown if c.fault]
+    assert faults == ["armature", "integrator", "held", "inertia"]
+    assert all(c.step == 0.1 and c.short and c.integrator == "RK4" for c in flown if c.fault)
+    assert told == pytest.approx(np.arange(1, len(flown) + 1) / len(flown))
+
+
 def test_a_wrong_order_fails() -> None:
     (section,) = validated(second_order).sections
     row = section.rows[-1]

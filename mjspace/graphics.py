@@ -1,0 +1,50 @@
+"""Whether the OpenGL that the environment variable MUJOCO_GL names is there.
+
+MuJoCo reads it when it is imported and fails with a traceback, whatever is to be done.
+"""
+
+import os
+import sys
+from ctypes.util import find_library
+
+from mjspace.errors import NoRendererError
+
+_ON = ("", "enable", "enabled", "on", "true", "1", "glfw")
+_OFF = ("disable", "disabled", "off", "false", "0")
+_OF_PLATFORM = {"linux": ("egl", "osmesa", "glx"), "win32": ("wgl",), "darwin": ("cgl",)}
+_NEEDS = {  # library, and the package of Debian and Ubuntu that has it
+    "egl": ("EGL", "libegl1 libgl1"),
+    "osmesa": ("OSMesa", "libosmesa6"),
+}
+
+
+def chosen() -> str:
+    """Return the value of MUJOCO_GL; '' when it is not set."""
+    return os.environ.get("MUJOCO_GL", "").lower().strip()
+
+
+def check() -> None:
+    """Check MUJOCO_GL.
+
+    Raises:
+        NoRendererError: it has a value that MuJoCo does not know, or names a library that is not
+            installed; with the values that there are, or what to install.
+    """
+    value = chosen()
+    known = (*_OF_PLATFORM.get(sys.platform, ()), *_ON[1:], *_OFF)
+    if value and value not in known:
+        raise NoRendererError(
+            f"MUJOCO_GL={os.environ['MUJOCO_GL']}: MuJoCo does not know this value; use one of "
+            f"{', '.join(known)}, or unset it"
+        )
+    library, package = _NEEDS.get(value, ("", ""))
+    if library and find_library(library) is None:
+        raise NoRendererError(
+            f"MUJOCO_GL={value}: the library {library} is not installed (Debian and Ubuntu: "
+            f"apt-get install {package}); install it, or unset MUJOCO_GL"
+        )
+
+
+def is_off() -> bool:
+    """Tell whether MUJOCO_GL switches rendering off."""
+    return chosen() in _OFF
