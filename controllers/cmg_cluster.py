@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, GimbalRateCommand, Measurement, Reference, gain
+from mjspace.contract import Array, Gains, GimbalRateCommand, Measurement, Reference, gain
 
 from . import cmg_steering, pd_plus, pd_plus_kernels
 
@@ -36,49 +36,37 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CmgCluster:
+class CmgCluster(Gains):
     """PD+ wants the torque tau; d' = -A^T (A A^T + lambda E)^-1 tau / h0 makes it."""
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """M: of the whole vehicle, body axes."""
-    gimbal_axes: Array = gain(shape=(None, 3))
+    gimbal_axes: Array = gain(shape=("cmg", 3), form="unit vector")
     """Unit, body axes."""
-    spin_axes: Array = gain(shape=(None, 3))
+    spin_axes: Array = gain(shape=("cmg", 3), form="unit vector")
     """Of the wheels, unit, body axes, at gimbal angles of zero."""
-    wheel_inertia: Array = gain("kg m^2", (None,))
+    wheel_inertia: Array = gain("kg m^2", ("cmg",), above=0.0)
     """Axial, of each wheel."""
-    attitude_gain: float = gain("1/s", default=1.0)
+    attitude_gain: float = gain("1/s", default=1.0, above=0.0)
     """lam: with s = 0, sigma_e vanishes at this rate."""
-    rate_gain: float = gain("N m s/rad", default=20.0)
+    rate_gain: float = gain("N m s/rad", default=20.0, above=0.0)
     """Kc, the same on each axis."""
-    momentum: float = gain("N m s", default=2.0)
+    momentum: float = gain("N m s", default=2.0, above=0.0)
     """h0: of one wheel; the unit of the measure."""
-    measure_wanted: float = gain(default=0.5)
+    measure_wanted: float = gain(default=0.5, above=0.0)
     """m0: below it the steering gives up exactness for bounded rates."""
-    damping: float = gain(default=0.01)
+    damping: float = gain(default=0.01, at_least=0.0)
     """lambda0: in a singularity. Zero is the pseudo-inverse, whose rates have no bound."""
-    dither: float = gain(default=0.3)
-    """e0: by which the robust inverse turns to and fro, out of a locked direction; below 0.5."""
-    null_gain: float = gain("1/s", default=0.0)
+    dither: float = gain(default=0.3, at_least=0.0, below=0.5)
+    """e0: by which the robust inverse turns to and fro, out of a locked direction. Below 0.5, E is
+    positive definite."""
+    null_gain: float = gain("1/s", default=0.0, at_least=0.0)
     """Of the motion that makes no torque, towards a larger measure."""
-    gimbal_rate_limit: float = gain("rad/s", default=np.inf)
+    gimbal_rate_limit: float = gain("rad/s", default=np.inf, above=0.0, at_most=np.inf)
     """Fastest that is asked for; all rates are lessened alike, so that the torque keeps its
     direction."""
-
-    def __post_init__(self) -> None:
-        for name in ("attitude_gain", "rate_gain", "momentum", "measure_wanted"):
-            _require(name, getattr(self, name) > 0.0, getattr(self, name), "more than zero")
-        for name in ("damping", "dither", "null_gain"):
-            _require(name, getattr(self, name) >= 0.0, getattr(self, name), "zero or more")
-        _require("dither", self.dither < 0.5, self.dither, "less than 0.5")  # E stays positive
-        count = len(self.gimbal_axes)
-        if not count == len(self.spin_axes) == len(self.wheel_inertia):
-            raise ValueError(
-                f"{count} gimbal_axes, {len(self.spin_axes)} spin_axes and "
-                f"{len(self.wheel_inertia)} of wheel_inertia: a CMG has one of each"
-            )
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the empty state."""
@@ -117,8 +105,3 @@ class CmgCluster:
     def _steering_gains(self) -> Array:
         steering = [self.momentum, self.measure_wanted, self.damping]
         return np.array([*steering, self.dither, self.null_gain])
-
-
-def _require(name: str, good: bool, given: float, wanted: str) -> None:
-    if not good:
-        raise ValueError(f"{name} is {given:g}: {wanted} would do")

@@ -13,7 +13,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
 from . import contraction_kernels as kernels
 
@@ -78,7 +78,7 @@ class AdaptiveSignals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Ideal:
+class Ideal(Gains):
     """Known inertia: tau = H wd' - p x wd - Kc e, (3.6).
 
     In place of the printed h = R^T hI, which needs a constant momentum, the tachometers give
@@ -87,21 +87,18 @@ class Ideal:
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
-    wheel_axes: Array = gain(shape=(None, 3))
+    wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
     """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", (None,))
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), above=0.0)
     """Axial inertia of each wheel."""
-    rate_gain: float = gain("N m s/rad", default=25.0)
+    rate_gain: float = gain("N m s/rad", default=25.0, above=0.0)
     """Kc, the same on each axis."""
-    attitude_gain: float = gain("1/s", default=25.0)
+    attitude_gain: float = gain("1/s", default=25.0, above=0.0)
     """lc: contraction rate of the attitude."""
-    torque_limit: float = gain("N m", default=inf)
+    torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
     """Largest command on each axis."""
-
-    def __post_init__(self) -> None:
-        _require_positive(self, "rate_gain", "attitude_gain", "torque_limit")
 
     def reset(self, measurement: Measurement, reference: Reference) -> IdealState:
         """Return the state that starts on the branch nearer to the reference."""
@@ -122,7 +119,7 @@ class Ideal:
 
 
 @dataclass(frozen=True)
-class Gradient:
+class Gradient(Gains):
     """Estimated inertia, by the gradient alone: tau = Y theta_hat - Kc e, theta_hat' = -ga Y^T e.
 
     Equations (4.2) and (4.21); ga stays above zero where the paper prints zero (erratum 19). The
@@ -131,20 +128,16 @@ class Gradient:
 
     batched: ClassVar[bool] = True
 
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
-    rate_gain: float = gain("N m s/rad", default=25.0)
+    rate_gain: float = gain("N m s/rad", default=25.0, above=0.0)
     """Kc, the same on each axis."""
-    attitude_gain: float = gain("1/s", default=25.0)
+    attitude_gain: float = gain("1/s", default=25.0, above=0.0)
     """lc: contraction rate of the attitude."""
-    adaptation_gain: float = gain(default=1.0)
+    adaptation_gain: float = gain(default=1.0, above=0.0)
     """ga."""
-    torque_limit: float = gain("N m", default=inf)
+    torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
     """Largest command on each axis."""
-
-    def __post_init__(self) -> None:
-        _require_positive(self, "control_period", "rate_gain", "attitude_gain")
-        _require_positive(self, "adaptation_gain", "torque_limit")
 
     def reset(self, measurement: Measurement, reference: Reference) -> GradientState:
         """Return the state that knows nothing, on the branch nearer to the reference."""
@@ -166,7 +159,7 @@ class Gradient:
 
 
 @dataclass(frozen=True)
-class Adaptive:
+class Adaptive(Gains):
     """Estimated inertia and momentum: the composite law (4.2), (4.5)-(4.9).
 
     With erratum 15: ga Yf^T eps, and da ga Z. The estimate of hI assumes a constant total momentum.
@@ -178,28 +171,25 @@ class Adaptive:
 
     batched: ClassVar[bool] = True
 
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
-    rate_gain: float = gain("N m s/rad", default=25.0)
+    rate_gain: float = gain("N m s/rad", default=25.0, above=0.0)
     """Kc, the same on each axis."""
-    attitude_gain: float = gain("1/s", default=25.0)
+    attitude_gain: float = gain("1/s", default=25.0, above=0.0)
     """lc: contraction rate of the attitude."""
-    filter_bandwidth: float = gain("rad/s", default=2.0)
+    filter_bandwidth: float = gain("rad/s", default=2.0, above=0.0)
     """lF, of the filters that stand in for the unmeasured acceleration."""
-    adaptation_coupling: float = gain(default=2.0)
+    adaptation_coupling: float = gain(default=2.0, above=0.0)
     """da: share of the prediction error against that of the tracking error."""
-    adaptation_gain: float = gain(default=1.0)
+    adaptation_gain: float = gain(default=1.0, above=0.0)
     """ga."""
-    forgetting: float = gain("1/s", default=0.1)
+    forgetting: float = gain("1/s", default=0.1, at_least=0.0)
     """lf, of the information gathered; zero forgets nothing."""
-    torque_limit: float = gain("N m", default=inf)
+    torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
     """Largest command on each axis."""
 
     def __post_init__(self) -> None:
-        _require_positive(self, "control_period", "rate_gain", "attitude_gain", "filter_bandwidth")
-        _require_positive(self, "adaptation_coupling", "adaptation_gain", "torque_limit")
-        if self.forgetting < 0.0:
-            raise ValueError(f"forgetting is {self.forgetting:g} 1/s: zero or more would do")
+        super().__post_init__()
         if self.filter_bandwidth * self.control_period >= 1.0:
             raise ValueError(
                 f"filter_bandwidth is {self.filter_bandwidth:g} rad/s, control_period "
@@ -239,9 +229,3 @@ def _nearer(measurement: Measurement, reference: Reference) -> Array:
     """Return the measured q or -q, whichever makes an angle below 180 deg with the reference."""
     along = np.sum(measurement.attitude * reference.attitude, axis=-1, keepdims=True)
     return np.where(along < 0.0, -measurement.attitude, measurement.attitude)
-
-
-def _require_positive(law: object, *names: str) -> None:
-    for name in names:
-        if not getattr(law, name) > 0.0:
-            raise ValueError(f"{name} is {getattr(law, name):g}: more than zero would do")

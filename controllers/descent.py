@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Trajectory, gain
+from mjspace.contract import Array, Gains, Trajectory, gain
 
 
 @dataclass(frozen=True)
-class Descent(ABC):
+class Descent(Gains, ABC):
     """From ``height`` and ``reach`` to the site along one shape, then a hover, then down.
 
     The wanted attitude is the paper's: z along the thrust that the wanted motion needs against
@@ -22,30 +22,26 @@ class Descent(ABC):
     Its rate is that of the attitude; the paper takes it as zero.
     """
 
-    duration: float = gain("s")
+    duration: float = gain("s", above=0.0)
     """T, of the shape."""
-    height: float = gain("m", default=1000.0)
+    height: float = gain("m", default=1000.0, at_least=0.0)
     """At the start, above where the shape ends."""
-    reach: float = gain("m", default=2500.0)
+    reach: float = gain("m", default=2500.0, at_least=0.0)
     """At the start, along the landing plane."""
-    azimuth: float = gain("rad", default=0.6435)
+    azimuth: float = gain("rad", default=0.6435, at_least=-2.0 * np.pi, at_most=2.0 * np.pi)
     """theta_d: of the vertical plane, from x towards y."""
-    clearance: float = gain("m", default=0.0)
+    clearance: float = gain("m", default=0.0, at_least=0.0)
     """How high the shape ends; the start is as much higher. In the paper: on the ground."""
-    hover: float = gain("s", default=0.0)
+    hover: float = gain("s", default=0.0, at_least=0.0)
     """How long it stays there."""
-    descent_speed: float = gain("m/s", default=0.5)
+    descent_speed: float = gain("m/s", default=0.5, at_least=0.0)
     """Afterwards, without end: what touches down has to notice it."""
-    stance: float = gain("m", default=1.8)
+    stance: float = gain("m", default=1.8, at_least=0.0)
     """Of the vehicle's origin above the ground when it stands."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12)
+    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
     """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6)
+    moon_radius: float = gain("m", default=1.738e6, above=0.0)
     """Of the landing plane, tangent there."""
-
-    def __post_init__(self) -> None:
-        if not self.duration > 0.0:
-            raise ValueError(f"duration is {self.duration:g} s: more than zero would do")
 
     @abstractmethod
     def shape(self, s: Array) -> list[Array]:
@@ -74,7 +70,7 @@ class SineDescent(Descent):
     T is printed nowhere (erratum 18): 200 s fits the figures' time axis.
     """
 
-    duration: float = gain("s", default=200.0)
+    duration: float = gain("s", default=200.0, above=0.0)
 
     def shape(self, s: Array) -> list[Array]:
         """Return 1 - sin(pi s / 2) and its derivatives."""
@@ -87,7 +83,7 @@ class SineDescent(Descent):
 class CubicDescent(Descent):
     """(1 - t/T)^3, ours: it starts at the printed velocities and ends without acceleration."""
 
-    duration: float = gain("s", default=300.0)
+    duration: float = gain("s", default=300.0, above=0.0)
 
     def shape(self, s: Array) -> list[Array]:
         """Return (1 - s)^3 and its derivatives."""

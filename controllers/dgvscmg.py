@@ -10,11 +10,12 @@ arrays may have leading vehicle axes.
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, VoltageCommand, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, VoltageCommand, gain
 
 from . import motor_loops, pd_plus, steering
 
@@ -62,74 +63,76 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Cascade:
+class Cascade(Gains):
     """The attitude law (5.9), steering (5.7), speed loops (4.19)-(4.22), current loops (4.36)."""
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """Mb: of the bus alone, body axes."""
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
     """Of the attitude law and the steering."""
-    inner_period: float = gain("s")
+    inner_period: float = gain("s", above=0.0)
     """Of the motors' loops."""
-    rotor_inertia: float = gain("kg m^2", default=0.016)
+    rotor_inertia: float = gain("kg m^2", default=0.016, above=0.0)
     """Jw: of the wheel about its spin axis."""
-    attitude_gain: float = gain("1/s", default=1.0)
+    attitude_gain: float = gain("1/s", default=1.0, above=0.0)
     """lam."""
-    rate_gain: float = gain("N m s/rad", default=10.0)
+    rate_gain: float = gain("N m s/rad", default=10.0, above=0.0)
     """Kc, the same on each axis."""
-    disturbance_bound: float = gain("N m", default=0.05)
+    disturbance_bound: float = gain("N m", default=0.05, at_least=0.0)
     """tbar: largest norm of the disturbance."""
-    smoothing: float = gain("W", default=1e-6)
+    smoothing: float = gain("W", default=1e-6, above=0.0)
     """eps: what the relay of the disturbance's compensation may lose to smoothness."""
-    steering_damping: float = gain(default=0.01)
+    steering_damping: float = gain(default=0.01, at_least=0.0)
     """g0: cos(di) at which the steering loses half."""
-    momentum_damping: float = gain("N m s", default=0.01)
+    momentum_damping: float = gain("N m s", default=0.01, at_least=0.0)
     """Of the wheel, at which the gimbals' rates lose half, ours."""
-    gimbal_rate_limit: float = gain("rad/s", default=np.inf)
+    gimbal_rate_limit: float = gain("rad/s", default=inf, above=0.0, at_most=inf)
     """Fastest that is asked for, ours: beyond it the torque across the wheel's axis is less."""
-    wheel_acceleration_limit: float = gain("rad/s^2", default=np.inf)
+    wheel_acceleration_limit: float = gain("rad/s^2", default=inf, above=0.0, at_most=inf)
     """Largest that is asked for, ours."""
-    gyroscopic_feedforward: float = gain(default=1.0)
+    gyroscopic_feedforward: float = gain(default=1.0, at_least=0.0, at_most=1.0)
     """Share of the gyroscopic torque that the gimbals' motors are told of; the thesis has 0."""
-    turned_inertia: Array = gain("kg m^2", (3,), default=(0.018, 0.017, 0.016))
+    turned_inertia: Array = gain("kg m^2", (3,), default=(0.018, 0.017, 0.016), above=0.0)
     """J that each motor turns: outer gimbal, inner gimbal, wheel."""
-    speed_gain: Array = gain("N m s/rad", (3,), default=(2.0, 2.0, 0.32))
+    speed_gain: Array = gain("N m s/rad", (3,), default=(2.0, 2.0, 0.32), above=0.0)
     """k_p."""
-    integral_gain: Array = gain("N m/rad", (3,), default=(0.0, 0.0, 0.0))
+    integral_gain: Array = gain("N m/rad", (3,), default=(0.0, 0.0, 0.0), at_least=0.0)
     """k_i, ours."""
-    observer_gain: Array = gain("N m s/rad", (3,), default=(0.0, 0.0, 1.0))
+    observer_gain: Array = gain("N m s/rad", (3,), default=(0.0, 0.0, 1.0), at_least=0.0)
     """k_o."""
-    vibration_gain: Array = gain("N m/rad", (3,), default=(0.0, 0.0, 5.0))
+    vibration_gain: Array = gain("N m/rad", (3,), default=(0.0, 0.0, 5.0), at_least=0.0)
     """k_e; zero: no rejection of vibration."""
-    adaptation_gain: Array = gain("1/(N m)^2", (3,), default=(0.0, 0.0, 1.0))
+    adaptation_gain: Array = gain("1/(N m)^2", (3,), default=(0.0, 0.0, 1.0), at_least=0.0)
     """k_a."""
-    vibration_limit: Array = gain("N m", (3,), default=(np.inf, np.inf, np.inf))
+    vibration_limit: Array = gain("N m", (3,), default=3 * (inf,), at_least=0.0, at_most=inf)
     """Largest vibration that is believed, ours: a rejection gone astray does no more than this."""
-    current_limit: Array = gain("A", (3,), default=(np.inf, np.inf, np.inf))
+    current_limit: Array = gain("A", (3,), default=3 * (inf,), above=0.0, at_most=inf)
     """Largest wanted I_q."""
-    speed_steps: int = gain(default=1)
+    speed_steps: int = gain(default=1, at_least=1, whole=True)
     """Inner periods in one of the speed loops; the current loops have every one."""
-    current_gain: float = gain("1/s", default=3000.0)
+    current_gain: float = gain("1/s", default=3000.0, above=0.0)
     """k_ep; k_ei is k_ep R/L."""
-    pole_pairs: Array = gain(shape=(3,), default=(4.0, 4.0, 6.0))
+    pole_pairs: Array = gain(shape=(3,), default=(4.0, 4.0, 6.0), at_least=1, whole=True)
     """p of each motor."""
-    resistance: Array = gain("ohm", (3,), default=(2.5, 2.5, 3.0))
+    resistance: Array = gain("ohm", (3,), default=(2.5, 2.5, 3.0), above=0.0)
     """R."""
-    inductance: Array = gain("H", (3,), default=(4.5e-3, 4.5e-3, 6e-3))
+    inductance: Array = gain("H", (3,), default=(4.5e-3, 4.5e-3, 6e-3), above=0.0)
     """L."""
-    torque_constant: Array = gain("N m/A", (3,), default=(1.5, 1.5, 2.0))
+    torque_constant: Array = gain("N m/A", (3,), default=(1.5, 1.5, 2.0), above=0.0)
     """k_m."""
 
     def __post_init__(self) -> None:
-        _ = self._speed_loop, self._current_loop  # which refuse gains that cannot be
-        period = self.speed_steps * self.inner_period
-        if abs(self.control_period / period - round(self.control_period / period)) > 1e-9:
-            raise ValueError(
-                f"speed_steps {self.speed_steps} make speed loops of {period:g} s: whole parts of "
-                f"the control period of {self.control_period:g} s would do"
-            )
+        super().__post_init__()
+        self._refuse_unstable()
+        inner = self.control_period / self.inner_period
+        if abs(inner / self.speed_steps - round(inner / self.speed_steps)) > 1e-9:
+            ratio = f"control_period / inner_period, {inner:g}"
+            raise ValueError(f"speed_steps: got {self.speed_steps}, should divide {ratio}")
+
+    def _refuse_unstable(self) -> None:
+        _ = self._speed_loop, self._current_loop  # which refuse unstable gains
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the state that wants the wheel as fast as it is and believes in no vibration."""
@@ -242,7 +245,6 @@ def _speeds(measurement: Measurement) -> Array:
     return np.concatenate([measurement.gimbal_rate, measurement.wheel_speed], axis=-1)
 
 
-def _carried(measurement: Measurement) -> Array:
+def _carried(seen: Measurement) -> Array:
     """Return how fast each rotor's carrier turns about its axis [rad/s], (..., 3)."""
-    seen = measurement
     return steering.carried(seen.rate, seen.gimbal_angle, seen.gimbal_rate)

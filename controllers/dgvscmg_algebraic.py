@@ -76,7 +76,14 @@ class Algebraic(dgvscmg.Cascade):
     """Of the wheel (4.3): amplitude [N m], cycles in a turn, phase [rad]."""
 
     def __post_init__(self) -> None:
-        _ = self._speed_loop  # which refuses gains that cannot be; there is no current loop
+        super().__post_init__()
+        if not np.all(self.vibration[:2] >= 0.0):
+            raise ValueError(
+                f"vibration: got {self.vibration.tolist()}, should begin with 0 or more twice"
+            )
+
+    def _refuse_unstable(self) -> None:
+        _ = self._speed_loop  # there is no current loop
 
     def reset(self, measurement: Measurement, reference: Reference) -> Any:
         """Return the state whose gimbals are at zero and at rest."""

@@ -38,11 +38,11 @@ class Sensorless(dgvscmg.Cascade):
 
     start_speed: float = gain("rad/s", default=73.0)
     """What the wheel's speed is believed to be at first; its sign must be right."""
-    voltage_limit: float = gain("V", default=np.inf)
+    voltage_limit: float = gain("V", default=np.inf, above=0.0, at_most=np.inf)
     """Of the supply of the wheel's motor: the observer must know what was cut."""
-    observer_bandwidth: float = gain("rad/s", default=3000.0)
+    observer_bandwidth: float = gain("rad/s", default=3000.0, above=0.0)
     """Of the observed back-EMF."""
-    tracking_bandwidth: float = gain("rad/s", default=1000.0)
+    tracking_bandwidth: float = gain("rad/s", default=1000.0, above=0.0)
     """Of the loop that reads angle and speed from it."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> Any:

@@ -42,9 +42,9 @@ class Unloading(dgvscmg.Cascade):
 
     bias_speed: float = gain("rad/s", default=73.0)
     """W0."""
-    unloading_gain: float = gain("1/s", default=0.1)
+    unloading_gain: float = gain("1/s", default=0.1, at_least=0.0)
     """k: slower than the manoeuvre, whose momentum the thrusters would give and take else."""
-    thruster_limit: float = gain("N m", default=0.1)
+    thruster_limit: float = gain("N m", default=0.1, at_least=0.0, at_most=np.inf)
     """Largest torque that is asked of the thrusters."""
 
     def step(

@@ -1,61 +1,62 @@
-"""A descent to the Moon that saves propellant: a Bezier curve, and the plan that finds it.
+"""A descent to the Moon along a Bezier curve, and the plan of the one that burns least.
 
-What a hovering engine burns goes with time, so the thriftiest descent is a short one: it drops
-first, and brakes late, at nearly full thrust. World axes as in ``descent``; the curve is given in
-(along, across, up), with ``along`` horizontal at ``azimuth``.
+World axes as in ``descent``; the curve is given in (along, across, up), with ``along`` horizontal
+at ``azimuth``.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
-from scipy.optimize import minimize
 
-from mjspace.contract import Array, Trajectory, gain
+from mjspace.contract import Array, Gains, Trajectory, gain
 
+from .bezier import curve
 from .descent import powered
+from .descent_limits import Limits, keeps, shortest_duration, thriftiest
 
 EXHAUST_SPEED = 320.0 * 9.80665
 """Isp g0 of the lander's engine [m/s]."""
 TABLE_3 = (
     (2500.0, 0.0, 1000.0),
-    (2288.601, -61.658, 911.917),
-    (2077.201, -123.316, 750.446),
-    (1865.802, -184.975, 356.944),
-    (524.439, 82.271, 1575.039),
-    (1169.866, -199.81, -693.676),
-    (0.0, 0.0, 612.74),
-    (0.0, 0.0, -45.805),
-    (0.0, 0.0, 6.404),
+    (2288.411, -61.714, 911.838),
+    (2076.821, -123.427, 754.06),
+    (1865.232, -185.141, 337.472),
+    (522.683, 81.009, 1588.088),
+    (1169.953, -199.488, -701.893),
+    (0.0, 0.0, 614.185),
+    (0.0, 0.0, -47.556),
+    (0.0, 0.0, 6.408),
     (0.0, 0.0, 2.0),
 )
-"""What ``plan`` finds for the start of paper 003's table 3 [m], to be flown in 79.275 s."""
+"""What ``plan`` finds for the start of paper 003's table 3 [m], to be flown in 79.346 s."""
+PACE = 1.15
+"""Ratio of the durations that the search of a plan starts with."""
 
 
 @dataclass(frozen=True)
-class BezierDescent:
+class BezierDescent(Gains):
     """A Bezier curve to above the site, then down at its last speed, without end.
 
     By default it starts as in paper 003's table 3 and burns 5.13 kg within 70 and 270 N and 45 deg
     of tilt, where the paper's own descent needs 10.7 kg.
     """
 
-    duration: float = gain("s", default=79.275)
+    duration: float = gain("s", default=79.346, above=0.0)
     """T, of the curve."""
     points: Array = gain("m", (None, 3), default=TABLE_3)
     """Control points, (along, across, up) from the site, n + 1 rows for degree n."""
-    azimuth: float = gain("rad", default=0.6435)
+    azimuth: float = gain("rad", default=0.6435, at_least=-2.0 * np.pi, at_most=2.0 * np.pi)
     """Of ``along``, from x towards y."""
-    stance: float = gain("m", default=1.8)
+    stance: float = gain("m", default=1.8, at_least=0.0)
     """Of the vehicle's origin above the ground when it stands."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12)
+    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
     """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6)
+    moon_radius: float = gain("m", default=1.738e6, above=0.0)
     """Of the landing plane, tangent there."""
 
     def __post_init__(self) -> None:
-        if not self.duration > 0.0:
-            raise ValueError(f"duration is {self.duration:g} s: more than zero would do")
+        super().__post_init__()
         if len(self.points) < 5:
             raise ValueError(f"points has {len(self.points)} rows: 5 or more would do")
 
@@ -71,18 +72,6 @@ class BezierDescent:
         motion = [part @ to_world for part in motion]
         motion[0] += np.array([0.0, 0.0, self.stance])
         return powered(motion, self.azimuth, self.gravity_parameter, self.moon_radius)
-
-
-def curve(points: Array, duration: float, s: Array) -> list[Array]:
-    """Return a Bezier curve and its first four derivatives by time at ``s``, 0 to 1: (n, 3) each.
-
-    ``points`` (k, 3) [m] are passed in ``duration`` [s].
-    """
-    found, corners = [], points
-    for _ in range(5):
-        found.append(_blend(len(corners) - 1, s) @ corners)
-        corners = np.diff(corners, axis=0) * ((len(corners) - 1) / duration)
-    return found
 
 
 def plan(
@@ -104,49 +93,43 @@ def plan(
     ``thrust_range`` [N] and within ``tilt_limit`` [rad] of the vertical, and the vehicle above
     ``glide_slope`` times its distance, less a metre. Flat ground, ``mass`` [kg] constant.
 
+    What a hovering engine burns goes with time, so the thriftiest descent is a short one: it drops
+    first, and brakes late, at nearly full thrust. The duration lies between the shortest in which
+    thrust and gravity can take away height and speed, and that of a mean speed of
+    ``descent_speed``; no longer one is tried than the gravity losses of the best one allow.
+
     Raises:
-        ValueError: no such descent was found.
+        ValueError: no descent was found that ``keeps`` within the limits.
     """
-    s = np.linspace(0.0, 1.0, 101)
-    blend, bend = _blend(9, s), _blend(7, s)
-    end, last = np.array([0.0, 0.0, clearance]), np.array([0.0, 0.0, -descent_speed])
+    limits = Limits(mass, gravity, thrust_range, tilt_limit, glide_slope, clearance, descent_speed)
+    refused = f"no descent from {place} m at {velocity} m/s"
+    way = place - limits.end
+    if way[2] + 1.0 < glide_slope * np.hypot(way[0], way[1]):
+        raise ValueError(f"{refused}: it starts below the glide slope")
+    shortest = shortest_duration(way[2], -velocity[2], limits)
+    longest = float(np.sqrt((way**2).sum())) / descent_speed
+    if not np.isfinite(shortest):
+        raise ValueError(f"{refused}: full thrust does not brake it above the ground")
 
-    def points_of(x: Array) -> tuple[float, Array]:
-        # Evenly spaced points: no horizontal acceleration and jerk, hence no tilt and no rate.
-        duration, ends = 10.0 * x[0], np.arange(4)[:, None] * (10.0 * x[0] / 9.0)
-        sides = 100.0 * x[1:5].reshape(2, 2)
-        points = np.empty((10, 3))
-        points[:4], points[:5:-1] = place + ends * velocity, end - ends * last
-        points[4:6, :2], points[2:8, 2] = sides, 100.0 * x[5:]
-        return duration, points
+    def cost(duration: float) -> float:
+        return thriftiest(duration, place, velocity, limits)[1]
 
-    def force(x: Array) -> Array:
-        duration, points = points_of(x)
-        felt = bend @ np.diff(points, 2, axis=0) * (72.0 / duration**2)
-        felt[:, 2] += gravity
-        return mass * felt
-
-    def propellant(x: Array) -> float:
-        return burnt(np.linalg.norm(force(x), axis=-1), 10.0 * x[0] * s)
-
-    def margins(x: Array) -> Array:
-        pushed, seen = force(x), blend @ points_of(x)[1]
-        size = np.linalg.norm(pushed, axis=-1)
-        upright = pushed[:, 2] - np.cos(tilt_limit) * size
-        above = seen[:, 2] - end[2] + 1.0 - glide_slope * np.hypot(seen[:, 0], seen[:, 1])
-        limits = [size - thrust_range[0], thrust_range[1] - size, upright, above]
-        return 0.01 * np.concatenate(limits)
-
-    way = np.linspace(0.8, 0.2, 2)[:, None] * place[:2]
-    start = np.concatenate([way.ravel(), np.linspace(0.8, 0.1, 6) * place[2]])
-    guess = np.concatenate([[10.0], 0.01 * start])
-    within = {"type": "ineq", "fun": margins}
-    found = minimize(
-        propellant, guess, method="SLSQP", constraints=within, options={"maxiter": 300}
-    )
-    if not found.success or margins(found.x).min() < -1e-6:
-        raise ValueError(f"no descent from {place} m at {velocity} m/s: {found.message}")
-    return points_of(found.x)
+    costs: dict[float, float] = {}
+    duration = max(shortest, 1.0)
+    while duration <= longest:
+        costs[duration] = cost(duration)
+        duration *= PACE
+        # Thrust over weight, summed over time, is at least this time plus the gain in speed.
+        if duration - (descent_speed + velocity[2]) / gravity > min(costs.values()):
+            break
+    if not costs:
+        raise ValueError(f"{refused} lasts between {shortest:.4g} and {longest:.4g} s")
+    best = min(costs, key=lambda duration: costs[duration])
+    duration = _golden(cost, max(best / PACE, shortest), min(best * PACE, longest))
+    points = thriftiest(duration, place, velocity, limits)[0]
+    if not keeps(points, duration, place, velocity, limits):
+        raise ValueError(f"{refused} of {shortest:.4g} to {longest:.4g} s keeps within the limits")
+    return duration, points
 
 
 def burnt(thrust: Array, time: Array) -> float:
@@ -154,7 +137,18 @@ def burnt(thrust: Array, time: Array) -> float:
     return float(np.trapezoid(thrust, time)) / EXHAUST_SPEED
 
 
-def _blend(degree: int, s: Array) -> Array:
-    """Return Bernstein's polynomials at ``s`` (n,), shape (n, degree + 1)."""
-    terms = [comb(degree, k) * s**k * (1.0 - s) ** (degree - k) for k in range(degree + 1)]
-    return np.stack(terms, axis=-1)
+def _golden(cost: Callable[[float], float], low: float, high: float) -> float:
+    """Return where ``cost`` is least between two durations, to a twentieth of a second."""
+    ratio = (np.sqrt(5.0) - 1.0) / 2.0
+    a, b = high - ratio * (high - low), low + ratio * (high - low)
+    cost_a, cost_b = cost(a), cost(b)
+    while high - low > 0.05:
+        if cost_a < cost_b:
+            high, b, cost_b = b, a, cost_a
+            a = high - ratio * (high - low)
+            cost_a = cost(a)
+        else:
+            low, a, cost_a = a, b, cost_b
+            b = low + ratio * (high - low)
+            cost_b = cost(b)
+    return float(0.5 * (low + high))

@@ -15,7 +15,7 @@ import numpy as np
 from numba import guvectorize, njit
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
 
 class State(NamedTuple):
@@ -39,7 +39,7 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ImmersionInvariance:
+class ImmersionInvariance(Gains):
     """Law (15) of paper 000, with p = R^T p_r (erratum 2) read from the tachometers.
 
     The torque H J^-1 (v - J' w) - p x w, v = x_d'' + (K + Gamma) x_e' + Gamma K x_e, makes
@@ -48,23 +48,18 @@ class ImmersionInvariance:
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
-    wheel_axes: Array = gain(shape=(None, 3))
+    wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
     """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", (None,))
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), above=0.0)
     """Axial inertia of each wheel."""
-    target_gain: float = gain("1/s", default=10.0)
+    target_gain: float = gain("1/s", default=10.0, above=0.0)
     """K: rate of the target system x_e' = -K x_e."""
-    manifold_gain: float = gain("1/s", default=5.0)
+    manifold_gain: float = gain("1/s", default=5.0, above=0.0)
     """Gamma: rate at which the manifold z = 0 is reached."""
     unwrap_from: Array = gain("rad", (3,), default=(0.0, 0.0, 0.0))
     """The first measured roll and yaw are taken within half a turn of these."""
-
-    def __post_init__(self) -> None:
-        for name in ("target_gain", "manifold_gain"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} is {getattr(self, name):g} 1/s: more than zero would do")
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the angles, the measured ones on the turn of ``unwrap_from``."""

@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, ThrustCommand, Trajectory, gain
+from mjspace.contract import Array, Gains, Measurement, ThrustCommand, Trajectory, gain
 
 from . import lander_kernels as kernels
 from .lander_lqr import PRINTED, lqr_gain
@@ -43,7 +43,7 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class VariableStructure:
+class VariableStructure(Gains):
     """U = -S - rho tanh(rho S / delta) with S = Ka X2 + Rx(alpha) K Z, (33), (34), (36).
 
     With all corrections as by default, and thrust that knows gravity and the wanted acceleration,
@@ -60,41 +60,44 @@ class VariableStructure:
     """M5: Ka Rx Ka^-1 K for Rx K; without it, a roll rate leads astray (erratum 14)."""
     follows_gravity: bool = True
     """Thrust m (x_d'' + g + U1) / cos(tilt); else Fe + U1, where U1 is in newtons."""
-    equilibrium_thrust: float = gain("N", default=160.0)
+    equilibrium_thrust: float = gain("N", default=160.0, at_least=0.0)
     """Fe (M1); printed: 0, so that U1 has to hold the weight (erratum 9)."""
     recomputed: bool = False
     """K by the Riccati equation, in place of the printed one."""
     surface_gain: Array = gain(shape=(3,), default=(1.0, 14.0, -2.0))
     """Ka; k3 is printed as +2, for which K's third row has the wrong sign (M2, erratum 10)."""
-    loop_share: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0))
+    loop_share: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0), above=0.0)
     """Multiplies S: how fast each axis is brought to its surface."""
-    robust_gain: float = gain(default=1.0)
+    robust_gain: float = gain(default=1.0, at_least=0.0)
     """rho; with the printed delta it adds 2 % to S, and no robustness (erratum 17)."""
-    smoothing: float = gain(default=50.0)
+    smoothing: float = gain(default=50.0, above=0.0)
     """delta."""
-    radius: float = gain("m", default=1e4)
+    radius: float = gain("m", default=1e4, above=0.0)
     """re, that K is made for."""
-    mass: float = gain("kg", default=100.0)
+    mass: float = gain("kg", default=100.0, above=0.0)
     """m, at the start."""
-    tank: float = gain("kg", default=0.0)
+    tank: float = gain("kg", default=0.0, at_least=0.0)
     """Propellant at the start: what its gauge shows to be gone makes m less. 0: m stays."""
-    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0))
+    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0), at_least=0.0, at_most=np.inf)
     """Least, without which no torque is left, and largest."""
-    gimbal_limit: float = gain("rad", default=np.radians(20.0))
+    gimbal_limit: float = gain("rad", default=np.radians(20.0), above=0.0, at_most=np.pi)
     """Of either angle."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12)
+    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
     """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6)
+    moon_radius: float = gain("m", default=1.738e6, above=0.0)
     """Of the landing site."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.coordinates not in _COORDINATES:
             have = ", ".join(_COORDINATES)
-            raise ValueError(f"coordinates is {self.coordinates!r}: one of {have} would do")
+            raise ValueError(f"coordinates: got {self.coordinates!r}, should be one of {have}")
         if not np.all(self.surface_gain):
-            raise ValueError(f"surface_gain is {self.surface_gain}: none of it may be zero")
-        if not 0.0 <= self.thrust_range[0] <= self.thrust_range[1]:
-            raise ValueError(f"thrust_range is {self.thrust_range} N: least, then largest would do")
+            raise ValueError(f"surface_gain: got {self.surface_gain}, none of it may be zero")
+        if not (np.inf > self.thrust_range[0] <= self.thrust_range[1]):
+            raise ValueError(
+                f"thrust_range: got {self.thrust_range} N, should be the least, then the largest"
+            )
 
     def reset(self, measurement: Measurement, reference: Trajectory) -> State:
         """Return the state of an engine that burns."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, gain
+from mjspace.contract import Array, Gains, Measurement, gain
 
 from . import lander_filter_kernels as kernels
 
@@ -38,36 +38,36 @@ class Belief(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Navigation:
+class Navigation(Gains):
     """The filter's gains: standard deviations, each of one sample and on each axis."""
 
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
     """Of ``step``, and of the gyro and the accelerometer."""
-    position_fix: float = gain("m", default=20.0)
+    position_fix: float = gain("m", default=20.0, at_least=0.0)
     """Of the position at the start, the last that is read."""
-    velocity_fix: float = gain("m/s", default=1.0)
+    velocity_fix: float = gain("m/s", default=1.0, at_least=0.0)
     """Of the velocity at the start, likewise."""
-    attitude_fix: float = gain("rad", default=0.01)
+    attitude_fix: float = gain("rad", default=0.01, at_least=0.0)
     """Of the attitude at the start, likewise."""
-    gyro_noise: float = gain("rad/s", default=1e-3)
+    gyro_noise: float = gain("rad/s", default=1e-3, at_least=0.0)
     """Of the white noise of ``rate``."""
-    gyro_bias: float = gain("rad/s", default=1e-4)
+    gyro_bias: float = gain("rad/s", default=1e-4, at_least=0.0)
     """Of its bias at the start."""
-    gyro_walk: float = gain("rad/s", default=1e-6)
+    gyro_walk: float = gain("rad/s", default=1e-6, at_least=0.0)
     """Of its bias's walk in one second."""
-    accelerometer_noise: float = gain("m/s^2", default=0.01)
+    accelerometer_noise: float = gain("m/s^2", default=0.01, at_least=0.0)
     """Of the white noise of ``specific_force``, the mean of a period."""
-    accelerometer_bias: float = gain("m/s^2", default=0.005)
+    accelerometer_bias: float = gain("m/s^2", default=0.005, at_least=0.0)
     """Of its bias at the start."""
-    accelerometer_walk: float = gain("m/s^2", default=1e-5)
+    accelerometer_walk: float = gain("m/s^2", default=1e-5, at_least=0.0)
     """Of its bias's walk in one second."""
-    altimeter_noise: float = gain("m", default=0.5)
+    altimeter_noise: float = gain("m", default=0.5, above=0.0)
     """Of ``altitude``."""
-    velocimeter_noise: float = gain("m/s", default=0.05)
+    velocimeter_noise: float = gain("m/s", default=0.05, above=0.0)
     """Of ``ground_velocity``."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12)
+    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
     """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6)
+    moon_radius: float = gain("m", default=1.738e6, above=0.0)
     """Of the landing site."""
 
     def fix(self, measurement: Measurement) -> Belief:

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numba import guvectorize, njit
 
-from mjspace.contract import Array, Measurement, ThrustCommand, Trajectory, gain
+from mjspace.contract import Array, Gains, Measurement, ThrustCommand, Trajectory, gain
 
 from .lander import burning, touched
 from .lander_kernels import clipped
@@ -44,7 +44,7 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ThrustVectoring:
+class ThrustVectoring(Gains):
     """Three loops, each quicker than the one around it: place, tilt, rate.
 
     f = a_d + g - kd e' - kp e - ki (integral of e) is the wanted thrust over mass; n = f / |f| is
@@ -54,52 +54,52 @@ class ThrustVectoring:
 
     batched: ClassVar[bool] = True
 
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
     """Of ``step``."""
-    position_gain: float = gain("1/s^2", default=0.04)
+    position_gain: float = gain("1/s^2", default=0.04, above=0.0)
     """kp."""
-    velocity_gain: float = gain("1/s", default=0.32)
+    velocity_gain: float = gain("1/s", default=0.32, above=0.0)
     """kd."""
-    integral_gain: float = gain("1/s^3", default=0.002)
+    integral_gain: float = gain("1/s^3", default=0.002, at_least=0.0)
     """ki: against a mass other than m."""
-    integral_reach: float = gain("m", default=1.0)
+    integral_reach: float = gain("m", default=1.0, above=0.0)
     """A larger error counts as this in the integral."""
-    feedback_limit: float = gain("m/s^2", default=0.3)
+    feedback_limit: float = gain("m/s^2", default=0.3, above=0.0)
     """Of kd e' + kp e: less than what the wanted motion leaves of the thrust."""
-    pointing_gain: float = gain("1/s", default=1.0)
+    pointing_gain: float = gain("1/s", default=1.0, above=0.0)
     """ka."""
-    turn_limit: float = gain("rad/s", default=0.1)
+    turn_limit: float = gain("rad/s", default=0.1, above=0.0)
     """Of ka z x n: what a throttled engine on slow gimbals can stop again."""
-    rate_gain: float = gain("1/s", default=2.0)
+    rate_gain: float = gain("1/s", default=2.0, above=0.0)
     """kw."""
-    tilt_limit: float = gain("rad", default=np.radians(60.0))
+    tilt_limit: float = gain("rad", default=np.radians(60.0), above=0.0, below=0.5 * np.pi)
     """How far from the vertical it may point; less horizontal thrust is asked for, then."""
-    mass: float = gain("kg", default=100.0)
+    mass: float = gain("kg", default=100.0, above=0.0)
     """m."""
-    inertia: Array = gain("kg m^2", (3, 3), default=np.diag([90.0, 80.0, 100.0]))
+    inertia: Array = gain("kg m^2", (3, 3), default=np.diag([90.0, 80.0, 100.0]), form="inertia")
     """J, about the centre of mass, body axes."""
-    lever: float = gain("m", default=1.0)
+    lever: float = gain("m", default=1.0, above=0.0)
     """How far the gimbals are below the centre of mass."""
-    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0))
+    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0), above=0.0, at_most=np.inf)
     """Least, without which no torque is left, and largest."""
-    gimbal_limit: float = gain("rad", default=np.radians(20.0))
+    gimbal_limit: float = gain("rad", default=np.radians(20.0), above=0.0, at_most=np.pi)
     """Of either angle."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12)
+    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
     """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6)
+    moon_radius: float = gain("m", default=1.738e6, above=0.0)
     """Of the landing site."""
 
     def __post_init__(self) -> None:
-        for name in _POSITIVE:
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} is {getattr(self, name):g}: more than zero would do")
-        if not 0.0 < self.thrust_range[0] <= self.thrust_range[1]:
-            raise ValueError(f"thrust_range is {self.thrust_range} N: 0 < least < most would do")
-        stable = self.position_gain * self.velocity_gain  # Routh
-        if not 0.0 <= self.integral_gain < stable:
+        super().__post_init__()
+        if not (np.inf > self.thrust_range[0] <= self.thrust_range[1]):
             raise ValueError(
-                f"integral_gain is {self.integral_gain:g} 1/s^3: "
-                f"less than position_gain velocity_gain = {stable:g} would do"
+                f"thrust_range: got {self.thrust_range} N, should be the least, then the largest"
+            )
+        stable = self.position_gain * self.velocity_gain  # Routh
+        if not self.integral_gain < stable:
+            raise ValueError(
+                f"integral_gain: got {self.integral_gain:g} 1/s^3, should be less than "
+                f"position_gain velocity_gain = {stable:g}"
             )
 
     def reset(self, measurement: Measurement, reference: Trajectory) -> State:
@@ -128,12 +128,6 @@ class ThrustVectoring:
         moon = [self.gravity_parameter, self.moon_radius]
         lasting = [self.integral_gain, self.integral_reach, self.control_period]
         return np.array([*loops, *limits, *lasting, *engine, *moon])
-
-
-_POSITIVE = (
-    *("control_period", "position_gain", "velocity_gain", "pointing_gain", "rate_gain"),
-    *("turn_limit", "integral_reach", "feedback_limit", "mass", "lever"),
-)
 
 
 @njit

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_continuous_are
 
-from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
 from . import wheel_feedback_kernels as kernels
 from .references import Regulation
@@ -113,7 +113,7 @@ def cost_to_go(
 
 
 @dataclass(frozen=True)
-class Regulator:
+class Regulator(Gains):
     """Infinite horizon: u = u_ref + K x with one K, from the algebraic Riccati equation.
 
     u_ref = I w_ref' + w_ref x I w_ref is zero for a reference at rest, for which it is meant.
@@ -121,25 +121,18 @@ class Regulator:
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """I: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
-    wheel_axes: Array = gain(shape=(None, 3))
+    wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
     """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", (None,))
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), above=0.0)
     """Axial inertia of each wheel."""
-    rate_weight: Array = gain("s^2", (3,), default=(10.0, 10.0, 10.0))
+    rate_weight: Array = gain("s^2", (3,), default=(10.0, 10.0, 10.0), at_least=0.0)
     """Of each squared rate in the cost."""
-    angle_weight: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0))
+    angle_weight: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0), above=0.0)
     """Of each squared component of a."""
-    torque_weight: Array = gain("1/(N^2 m^2)", (3,), default=(1.0, 1.0, 1.0))
+    torque_weight: Array = gain("1/(N^2 m^2)", (3,), default=(1.0, 1.0, 1.0), above=0.0)
     """Of each squared torque."""
-
-    def __post_init__(self) -> None:
-        if not np.all(self.rate_weight >= 0.0):
-            raise ValueError(f"rate_weight is {self.rate_weight}: zero or more would do")
-        for name in ("angle_weight", "torque_weight"):
-            if not np.all(getattr(self, name) > 0.0):
-                raise ValueError(f"{name} is {getattr(self, name)}: more than zero would do")
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the empty state."""
@@ -185,9 +178,9 @@ class Tracker(Regulator):
 
     angle: float = gain("rad", default=0.5 * np.pi)
     """Of the whole turn."""
-    duration: float = gain("s", default=60.0)
+    duration: float = gain("s", default=60.0, above=0.0)
     """From rest to rest: the horizon."""
-    axis: Array = gain(shape=(3,), default=(1.0, -2.0, 1.5))
+    axis: Array = gain(shape=(3,), default=(1.0, -2.0, 1.5), form="direction")
     """Of the turn; normalized."""
 
     def gain_at(self, time: float) -> Array:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numba
 
-from mjspace.contract import Array, Measurement, Reference, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, gain
 
 from .linear_quadratic import Regulator, Signals
 
@@ -41,16 +41,16 @@ class FieldRate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BDot:
+class BDot(Gains):
     """m = -k dB/dt, by the magnetometer alone: whatever turns the body in the field is braked.
 
     Stickler and Alfriend, Elementary magnetic attitude control system, J. Spacecraft and Rockets
     13, 1976. What is left turns with the field: 1.8 n over the poles of a dipole.
     """
 
-    rate_gain: float = gain("A m^2 s/T")
+    rate_gain: float = gain("A m^2 s/T", above=0.0)
     """k."""
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
     """From one reading to the next."""
     batched = True
 
@@ -75,7 +75,7 @@ class MagneticUnloading(Regulator):
     and nothing along B. The wheels are told of the torque, so that the attitude does not feel it.
     """
 
-    unloading_gain: float = gain("1/s", default=1e-3)
+    unloading_gain: float = gain("1/s", default=1e-3, at_least=0.0)
     """k."""
 
     def step(

@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, VoltageCommand, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, VoltageCommand, gain
 
 from .motor_loops import CurrentLoop, SpeedLoop, estimates
 
@@ -39,47 +39,48 @@ class BenchSignals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SpeedBench:
+class SpeedBench(Gains):
     """Speed and current loops of one motor whose speed is ``wheel_speed``, (..., 1)."""
 
     batched: ClassVar[bool] = True
 
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
     amplitude: float = gain("rad/s", default=20.0)
     """Of the wanted speed, amplitude sin(frequency t)."""
     frequency: float = gain("rad/s", default=0.5 * pi)
     """Of the wanted speed."""
-    rotor_inertia: float = gain("kg m^2", default=0.016)
+    rotor_inertia: float = gain("kg m^2", default=0.016, above=0.0)
     """J."""
-    pole_pairs: float = gain(default=6.0)
+    pole_pairs: float = gain(default=6.0, at_least=1, whole=True)
     """p."""
-    resistance: float = gain("ohm", default=3.0)
+    resistance: float = gain("ohm", default=3.0, above=0.0)
     """R."""
-    inductance: float = gain("H", default=6e-3)
+    inductance: float = gain("H", default=6e-3, above=0.0)
     """L."""
-    torque_constant: float = gain("N m/A", default=2.0)
+    torque_constant: float = gain("N m/A", default=2.0, above=0.0)
     """k_m."""
-    speed_gain: float = gain("N m s/rad", default=8.0)
+    speed_gain: float = gain("N m s/rad", default=8.0, above=0.0)
     """k_p."""
-    integral_gain: float = gain("N m/rad", default=0.0)
+    integral_gain: float = gain("N m/rad", default=0.0, at_least=0.0)
     """k_i, ours."""
-    observer_gain: float = gain("N m s/rad", default=1.0)
+    observer_gain: float = gain("N m s/rad", default=1.0, at_least=0.0)
     """k_o."""
-    vibration_gain: float = gain("N m/rad", default=5.0)
+    vibration_gain: float = gain("N m/rad", default=5.0, at_least=0.0)
     """k_e; zero: no rejection."""
-    adaptation_gain: float = gain("1/(N m)^2", default=0.26)
+    adaptation_gain: float = gain("1/(N m)^2", default=0.26, at_least=0.0)
     """k_a; zero: psi^2 is known to be ``ratio``."""
-    ratio: float = gain(default=0.0)
+    ratio: float = gain(default=0.0, at_least=0.0)
     """psi^2 to start from."""
-    current_gain: float = gain("1/s", default=3000.0)
+    current_gain: float = gain("1/s", default=3000.0, above=0.0)
     """k_ep; k_ei is k_ep R/L."""
-    voltage_limit: float = gain("V", default=inf)
+    voltage_limit: float = gain("V", default=inf, above=0.0, at_most=inf)
     """Of the supply."""
-    current_limit: float = gain("A", default=inf)
+    current_limit: float = gain("A", default=inf, above=0.0, at_most=inf)
     """Largest wanted current."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _ = self._speed_loop, self._current_loop  # which refuse gains that cannot be
 
     def reset(self, measurement: Measurement, reference: Reference) -> BenchState:

@@ -15,7 +15,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
 from . import pd_plus_kernels as kernels
 
@@ -81,7 +81,7 @@ def wanted_torque(
 
 
 @dataclass(frozen=True)
-class Classical:
+class Classical(Gains):
     """PD+: tau = M R_e^T wd' + wb x M wb - kp sigma_e - kv w_e, with wb = R_e^T wd.
 
     The thesis takes kp = wn^2 and kv = 2 wn with wn = 3.5 rad/s; as sigma_e is a quarter of the
@@ -91,15 +91,12 @@ class Classical:
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """M: of the rigid bus, about its centre of mass, body axes."""
-    attitude_gain: float = gain("N m", default=12.25)
+    attitude_gain: float = gain("N m", default=12.25, above=0.0)
     """kp, on the MRP: the stiffness is a quarter of it."""
-    rate_gain: float = gain("N m s/rad", default=7.0)
+    rate_gain: float = gain("N m s/rad", default=7.0, above=0.0)
     """kv, the same on each axis."""
-
-    def __post_init__(self) -> None:
-        _require_positive(self, "attitude_gain", "rate_gain")
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the empty state."""
@@ -119,7 +116,7 @@ class Classical:
 
 
 @dataclass(frozen=True)
-class Modified:
+class Modified(Gains):
     """Modified PD+, (3.7): tau = M wr' - M w x wr - (1 + |sigma_e|^2) sigma_e / 2 - Kc s.
 
     wr = wb - 2 lam sigma_e and s = w - wr: both errors vanish exponentially (Lemma 3.1.1).
@@ -127,15 +124,12 @@ class Modified:
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """M: of the rigid bus, about its centre of mass, body axes."""
-    attitude_gain: float = gain("1/s", default=1.0)
+    attitude_gain: float = gain("1/s", default=1.0, above=0.0)
     """lam: with s = 0, sigma_e vanishes at this rate."""
-    rate_gain: float = gain("N m s/rad", default=10.0)
+    rate_gain: float = gain("N m s/rad", default=10.0, above=0.0)
     """Kc, the same on each axis."""
-
-    def __post_init__(self) -> None:
-        _require_positive(self, "attitude_gain", "rate_gain")
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the empty state."""
@@ -158,7 +152,7 @@ class Modified:
 
 
 @dataclass(frozen=True)
-class Robust:
+class Robust(Gains):
     """Modified PD+ with compensation of a disturbance of which only a bound is known, (3.18).
 
     The third part, (3.19), is almost a relay: its slope at s = 0 is tbar^2 / eps, 16000 N m s/rad
@@ -169,23 +163,20 @@ class Robust:
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """M: of the rigid bus, about its centre of mass, body axes."""
-    attitude_gain: float = gain("1/s", default=1.0)
+    attitude_gain: float = gain("1/s", default=1.0, above=0.0)
     """lam: with s = 0, sigma_e vanishes at this rate."""
-    rate_gain: float = gain("N m s/rad", default=10.0)
+    rate_gain: float = gain("N m s/rad", default=10.0, above=0.0)
     """Kc, the same on each axis."""
-    disturbance_bound: float = gain("N m", default=0.04)
+    disturbance_bound: float = gain("N m", default=0.04, above=0.0)
     """tbar: largest norm of the disturbance; the thesis' reaches 0.0387 (E24)."""
-    smoothing: float = gain("W", default=1e-7)
+    smoothing: float = gain("W", default=1e-7, above=0.0)
     """eps: what the relay may lose to smoothness."""
-    wheel_axes: Array = gain(shape=(None, 3), default=np.zeros((0, 3)))
+    wheel_axes: Array = gain(shape=("wheel", 3), default=np.zeros((0, 3)), form="unit vector")
     """Of reaction wheels, body axes: their momentum turns with the bus; ours."""
-    wheel_inertia: Array = gain("kg m^2", (None,), default=())
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), default=(), above=0.0)
     """Axial, of each, which ``inertia`` is without."""
-
-    def __post_init__(self) -> None:
-        _require_positive(self, "attitude_gain", "rate_gain", "disturbance_bound", "smoothing")
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the empty state."""
@@ -206,9 +197,3 @@ class Robust:
     def _gains(self) -> Array:
         control = [self.attitude_gain, self.rate_gain]
         return np.array([*control, self.disturbance_bound, self.smoothing])
-
-
-def _require_positive(law: object, *names: str) -> None:
-    for name in names:
-        if not getattr(law, name) > 0.0:
-            raise ValueError(f"{name} is {getattr(law, name):g}: more than zero would do")

@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, PulseCommand, Reference, gain
+from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
 
 from .allocation import effect, pattern
 from .turn_kernels import turn
@@ -42,24 +42,25 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _PhasePlane(ABC):
+class _PhasePlane(Gains, ABC):
     """What these laws have in common: thrusters for both senses of each axis."""
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """Of the vehicle, body axes."""
-    axes: Array = gain(shape=(None, 3), default=np.eye(3))
+    axes: Array = gain(shape=(None, 3), default=np.eye(3), form="unit vector")
     """Those that are controlled, unit vectors in body axes, (m, 3)."""
-    thruster_positions: Array = gain("m", (None, 3))
+    thruster_positions: Array = gain("m", ("thruster", 3))
     """From the centre of mass, body axes, (n, 3)."""
-    thruster_directions: Array = gain(shape=(None, 3))
+    thruster_directions: Array = gain(shape=("thruster", 3), form="unit vector")
     """Of the force on the vehicle, body axes, (n, 3)."""
-    thruster_force: Array = gain("N", (None,))
+    thruster_force: Array = gain("N", ("thruster",), above=0.0)
     """Of each, (n,)."""
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         torques = self._effects[:3] @ self._patterns.swapaxes(1, 2)
         one, other = np.einsum("mi,sim->sm", self.axes, torques)
         if not np.allclose(one, -other, rtol=1e-9):
@@ -130,7 +131,7 @@ class Sliding(_PhasePlane):
     behind a delay tau < k it ends in a limit cycle of a' = U tau (k - tau/2) / (k - tau).
     """
 
-    rate_gain: float = gain("s", default=1.0)
+    rate_gain: float = gain("s", default=1.0, at_least=0.0)
     """k."""
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
@@ -144,7 +145,7 @@ class MinimumTime(_PhasePlane):
     It is off where |a| is below ``dead_band`` and |a'| below what one period gives.
     """
 
-    dead_band: float = gain("rad", default=1e-3)
+    dead_band: float = gain("rad", default=1e-3, at_least=0.0)
     """A switch late by tau misses the target by twice tau times the peak rate; this takes it up."""
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
@@ -163,7 +164,7 @@ class MinimumFuel(_PhasePlane):
     Memory: the first burn [s], the second [s], its sense, the time elapsed [s].
     """
 
-    final_time: float = gain("s")
+    final_time: float = gain("s", above=0.0)
     """T: not below the minimum time."""
 
     def _recall(self, angle: Array, rate: Array) -> Array:
@@ -198,18 +199,18 @@ class Schmitt(_PhasePlane):
     large. Memory: which way it fires.
     """
 
-    threshold: float = gain("rad")
+    threshold: float = gain("rad", above=0.0)
     """delta."""
-    hysteresis: float = gain("rad")
-    rate_gain: float = gain("s")
+    hysteresis: float = gain("rad", above=0.0)
+    rate_gain: float = gain("s", at_least=0.0)
     """k."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0.0 < self.hysteresis < self.threshold:
+        if not self.hysteresis < self.threshold:
             raise ValueError(
-                f"hysteresis is {self.hysteresis:g} rad: more than zero and less than threshold, "
-                f"{self.threshold:g} rad, would do"
+                f"hysteresis: got {self.hysteresis:g} rad, should be less than threshold, "
+                f"{self.threshold:g} rad"
             )
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
@@ -230,11 +231,11 @@ class MinimumImpulse(_PhasePlane):
     the axis.
     """
 
-    dead_zone: float = gain("rad")
+    dead_zone: float = gain("rad", above=0.0)
     """delta."""
-    pulse: float = gain("s")
+    pulse: float = gain("s", above=0.0)
     """How long each lasts; no shorter than the valves can."""
-    rate_gain: float = gain("s", default=0.0)
+    rate_gain: float = gain("s", default=0.0, at_least=0.0)
     """k: a + k a' is held within the dead zone."""
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:

@@ -10,26 +10,29 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.contract import Array, Law, Measurement, Wanted
+from mjspace.contract import Array, Gains, Law, Measurement, Wanted, gain
 
 _TICK = 1e-9  # s
 
 
 @dataclass(frozen=True)
-class Until:
+class Until(Gains):
     """When a phase is over: when all that is given here holds."""
 
-    after: float = 0.0
+    after: float = gain("s", default=0.0, at_least=0.0)
     """Least time since it began [s]."""
     signal: str = ""
     """A field of the measurement or one of its components: ``rate``, ``rate[2]``; of a vector its
     norm."""
-    below: float = np.inf
+    below: float = gain(default=np.inf, at_most=np.inf)
     """The signal must be less, in SI."""
-    above: float = -np.inf
+    above: float = gain(default=-np.inf, at_least=-np.inf)
     """The signal must be greater, in SI."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.signal, str):
+            raise ValueError(f"until.signal: got {self.signal!r}, should be text")
         bounded = np.isfinite(self.below) or np.isfinite(self.above)
         if bounded != bool(self.signal):
             raise ValueError("until: a signal and below or above go together")
@@ -77,6 +80,9 @@ class Phases:
     """Tables with the keys of ``Phase``, whose ``law`` and ``until`` are tables again."""
 
     def __post_init__(self) -> None:
+        tables = isinstance(self.phases, Sequence) and not isinstance(self.phases, str)
+        if not tables or not all(isinstance(table, Mapping) for table in self.phases):
+            raise ValueError(f"phases: got {self.phases!r}, should be a list of tables")
         given = tuple(_phase(number, table) for number, table in enumerate(self.phases))
         object.__setattr__(self, "phases", given)
         names = [phase.name for phase in given]
@@ -170,7 +176,7 @@ def _phase(number: int, table: Mapping[str, Any]) -> Phase:
     except (TypeError, ValueError) as error:
         keys = ", ".join(f.name for kind in (Phase, Until) for f in fields(kind))
         raise ValueError(f"phases.{number}: {error} (a phase and its until have {keys})") from None
-    if not (phase.name.isidentifier() and phase.name.islower()):
+    if not (isinstance(phase.name, str) and phase.name.isidentifier() and phase.name.islower()):
         raise ValueError(f"phases.{number}.name: {phase.name!r}: write a word in lower case")
     if not hasattr(phase.law, "step") or hasattr(phase.law, "inner"):
         raise ValueError(f"phases.{number}.law: wanted a table with a law's kind, without inner")

@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Measurement, PulseCommand, Reference, gain
+from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
 
 from .allocation import effect, pulses, share, within
 from .turn_kernels import turn
@@ -41,27 +41,27 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class PulsedPd:
+class PulsedPd(Gains):
     """tau = -kp sin(|a|/2) a/|a| - kd w_e + H alpha + w x H w, by thrusters."""
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3))
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """H: of the vehicle, body axes."""
-    thruster_positions: Array = gain("m", (None, 3))
+    thruster_positions: Array = gain("m", ("thruster", 3))
     """From the centre of mass, body axes, (n, 3)."""
-    thruster_directions: Array = gain(shape=(None, 3))
+    thruster_directions: Array = gain(shape=("thruster", 3), form="unit vector")
     """Of the force on the vehicle, body axes, (n, 3)."""
-    thruster_force: Array = gain("N", (None,))
+    thruster_force: Array = gain("N", ("thruster",), above=0.0)
     """Of each, (n,)."""
-    control_period: float = gain("s")
-    attitude_gain: float = gain("N m")
+    control_period: float = gain("s", above=0.0)
+    attitude_gain: float = gain("N m", at_least=0.0)
     """kp: half of it is the stiffness against small angles."""
-    rate_gain: float = gain("N m s/rad")
+    rate_gain: float = gain("N m s/rad", at_least=0.0)
     """kd, the same on each axis."""
-    thruster_minimum_on: float = gain("s", default=0.0)
+    thruster_minimum_on: float = gain("s", default=0.0, at_least=0.0)
     """What is less is not fired but carried over."""
-    force_weight: float = gain("m", default=1.0)
+    force_weight: float = gain("m", default=1.0, at_least=0.0)
     """Of a push that nobody asked for, against a wrong torque; zero lets it push."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:

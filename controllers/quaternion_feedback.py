@@ -15,7 +15,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
 from . import wheel_feedback_kernels as kernels
 
@@ -49,24 +49,19 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _OnWheels(ABC):
+class _OnWheels(Gains, ABC):
     """What the laws of this module have in common."""
 
     batched: ClassVar[bool] = True
 
-    control_period: float = gain("s")
+    control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
-    wheel_axes: Array = gain(shape=(None, 3))
+    wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
     """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", (None,))
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), above=0.0)
     """Axial inertia of each wheel."""
-    rate_gain: float = gain("N m s/rad", default=6.0)
+    rate_gain: float = gain("N m s/rad", default=6.0, above=0.0)
     """c, the same on each axis."""
-
-    def __post_init__(self) -> None:
-        for name in ("control_period", "rate_gain"):
-            value = getattr(self, name)
-            _require(name, value > 0.0, value, "more than zero")
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the state that begins with the sign measured, nothing turned or spent yet."""
@@ -115,7 +110,8 @@ class Fixed(_OnWheels):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require("attitude_gain", self.attitude_gain != 0.0, self.attitude_gain, "any other number")
+        if self.attitude_gain == 0.0:
+            raise ValueError("attitude_gain: got 0, should be any other number")
 
     def _law(self) -> tuple[float, float]:
         return self.attitude_gain, inf
@@ -129,15 +125,10 @@ class Switched(_OnWheels):
     the noise of a star tracker would switch it to and fro there.
     """
 
-    attitude_gain: float = gain("N m", default=1.0)
+    attitude_gain: float = gain("N m", default=1.0, above=0.0)
     """k0, on the quaternion: the stiffness is half of it."""
-    hysteresis: float = gain(default=0.05)
+    hysteresis: float = gain(default=0.05, at_least=0.0, below=1.0)
     """How far past zero q0 must be for the sign to change."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _require("attitude_gain", self.attitude_gain > 0.0, self.attitude_gain, "more than zero")
-        _require("hysteresis", 0.0 <= self.hysteresis < 1.0, self.hysteresis, "0 to 1")
 
     def _law(self) -> tuple[float, float]:
         return self.attitude_gain, self.hysteresis
@@ -155,8 +146,3 @@ class RateDamping(_OnWheels):
 
     def _law(self) -> tuple[float, float]:
         return 0.0, inf
-
-
-def _require(name: str, good: bool, given: float, wanted: str) -> None:
-    if not good:
-        raise ValueError(f"{name} is {given:g}: {wanted} would do")

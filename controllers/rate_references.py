@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Reference, gain
+from mjspace.contract import Array, Gains, Reference, gain
 
 _TURN = 0.05  # [rad] of amplitude and phase in a step; 3e-14 rad after 60 s, 7.5e-14 with 0.1
 _BLOCK = 64  # steps
 
 
 @dataclass(frozen=True)
-class Sinusoids:
+class Sinusoids(Gains):
     """Rates A sin(w t + phase) on the three desired axes, and the attitude that they lead to.
 
     The motion of Servín Aguilar 2022 (paper 001), chapter 3, and with a phase of 90 deg on the

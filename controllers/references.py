@@ -9,18 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Reference, gain
+from mjspace.contract import Array, Gains, Reference, gain
 
 
 @dataclass(frozen=True)
-class Hold:
+class Hold(Gains):
     """One attitude, at rest."""
 
-    attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0))
+    attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0), form="quaternion")
     """Quaternion, scalar first, body to inertial; normalized."""
-
-    def __post_init__(self) -> None:
-        _require_direction("attitude", self.attitude)
 
     def at(self, time: Array) -> Reference:
         """Return the same row for each ``time`` [s]."""
@@ -29,16 +26,13 @@ class Hold:
 
 
 @dataclass(frozen=True)
-class Turning:
+class Turning(Gains):
     """A turn at a constant rate: of axes that look at the planet from a circular orbit."""
 
     rate: Array = gain("rad/s", (3,))
     """In the axes that turn."""
-    attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0))
+    attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0), form="quaternion")
     """At time zero: quaternion, scalar first, body to inertial; normalized."""
-
-    def __post_init__(self) -> None:
-        _require_direction("attitude", self.attitude)
 
     def at(self, time: Array) -> Reference:
         """Return the turn at each ``time`` [s]."""
@@ -47,22 +41,17 @@ class Turning:
 
 
 @dataclass(frozen=True)
-class Slew:
+class Slew(Gains):
     """A rest-to-rest turn about the eigenaxis, the shorter way, with a quintic angle."""
 
-    attitude: Array = gain(shape=(4,))
+    attitude: Array = gain(shape=(4,), form="quaternion")
     """Where it ends: quaternion, scalar first, body to inertial; normalized."""
-    duration: float = gain("s")
+    duration: float = gain("s", above=0.0)
     """From rest to rest."""
     start_time: float = gain("s", default=0.0)
     """Held at ``start_attitude`` until then."""
-    start_attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0))
+    start_attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0), form="quaternion")
     """Where it starts."""
-
-    def __post_init__(self) -> None:
-        _require_direction("attitude", self.attitude)
-        _require_direction("start_attitude", self.start_attitude)
-        _require_positive("duration", self.duration)
 
     def at(self, time: Array) -> Reference:
         """Return the slew at each ``time`` [s]; held before it starts and after it ends."""
@@ -72,7 +61,7 @@ class Slew:
 
 
 @dataclass(frozen=True)
-class Regulation:
+class Regulation(Gains):
     """A rest-to-rest turn from the identity about one axis, of any angle, with a quintic angle.
 
     The reconstruction of Servín 2022 (paper 002), figures 4.9 and 4.10: "120 deg, acceleration
@@ -81,14 +70,10 @@ class Regulation:
 
     angle: float = gain("rad", default=2.0 * np.pi / 3.0)
     """Of the whole turn."""
-    duration: float = gain("s", default=2.0)
+    duration: float = gain("s", default=2.0, above=0.0)
     """From rest to rest."""
-    axis: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0))
+    axis: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0), form="direction")
     """Of the turn; normalized."""
-
-    def __post_init__(self) -> None:
-        _require_direction("axis", self.axis)
-        _require_positive("duration", self.duration)
 
     def at(self, time: Array) -> Reference:
         """Return the turn at each ``time`` [s]; held after it ends."""
@@ -97,7 +82,7 @@ class Regulation:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(Gains):
     """A turn from the identity about one axis: speed up, cruise, slow down, hold.
 
     The reconstruction of Servín 2022 (paper 002), figures 3.1 and 3.2; the ramps are cubic in rate.
@@ -105,20 +90,19 @@ class Sweep:
 
     peak_rate: float = gain("rad/s", default=np.pi / 6.0)
     """While cruising."""
-    ramp: float = gain("s", default=2.0)
+    ramp: float = gain("s", default=2.0, above=0.0)
     """How long it takes to reach the peak rate, and to come to rest again."""
-    cruise_end: float = gain("s", default=4.0)
+    cruise_end: float = gain("s", default=4.0, above=0.0)
     """When it starts to slow down; the whole turn is peak_rate times this."""
-    axis: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0))
+    axis: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0), form="direction")
     """Of the turn; normalized."""
 
     def __post_init__(self) -> None:
-        _require_direction("axis", self.axis)
-        _require_positive("ramp", self.ramp)
+        super().__post_init__()
         if self.cruise_end < self.ramp:
             raise ValueError(
-                f"cruise_end {self.cruise_end:g} s is before the end of the ramp: "
-                f"{self.ramp:g} s or more would do"
+                f"cruise_end: got {self.cruise_end:g} s, should not be before the ramp's end, "
+                f"{self.ramp:g} s"
             )
 
     def at(self, time: Array) -> Reference:
@@ -136,7 +120,7 @@ class Sweep:
 
 
 @dataclass(frozen=True)
-class MultiAxis:
+class MultiAxis(Gains):
     """Roll, pitch and yaw A (1 - cos w t): from rest at the identity, about ever other axes.
 
     Not in Servín 2022 (paper 002), whose motions about a fixed axis leave its nine parameters
@@ -149,6 +133,7 @@ class MultiAxis:
     """Of roll, pitch, yaw."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _require_regular(2.0 * self.amplitude)
 
     def at(self, time: Array) -> Reference:
@@ -160,7 +145,7 @@ class MultiAxis:
 
 
 @dataclass(frozen=True)
-class EulerSinusoids:
+class EulerSinusoids(Gains):
     """Roll, pitch and yaw A sin w t, as paper 000 simulates: x_d = [sin 5t, sin 2t, sin t]."""
 
     amplitude: Array = gain("rad", (3,), default=(1.0, 1.0, 1.0))
@@ -169,6 +154,7 @@ class EulerSinusoids:
     """Of roll, pitch, yaw."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _require_regular(self.amplitude)
 
     def at(self, time: Array) -> Reference:
@@ -209,18 +195,6 @@ def _from_euler(x: Array, dx: Array, ddx: Array) -> Reference:
     return Reference(
         att.from_euler_zyx(x), np.stack(rate, axis=-1), np.stack(acceleration, axis=-1)
     )
-
-
-def _require_direction(name: str, vector: Array) -> None:
-    if not np.linalg.norm(vector) > 1e-6:
-        raise ValueError(
-            f"{name} {np.asarray(vector).tolist()} has no direction: give a longer one"
-        )
-
-
-def _require_positive(name: str, value: float) -> None:
-    if not value > 0.0:
-        raise ValueError(f"{name} is {value:g} s: more than zero would do")
 
 
 def _require_regular(reach: Array) -> None:

@@ -1,56 +1,99 @@
-"""A wanted motion from a table of attitudes: a smooth curve through them, with its derivatives."""
+"""A desired motion from a table of attitudes: a smooth curve through them, with its derivatives."""
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Reference, gain
+from mjspace.contract import Array, Gains, Reference, gain
+
+_SLOW = 0.05  # of the largest rate: what counts as rest at an end of the table
+_TICK = 1e-9  # s
 
 
 @dataclass(frozen=True)
-class Table:
-    """Attitudes at given times, on a curve of continuous acceleration that rests at its ends.
+class Table(Gains):
+    """Attitudes at given times, on a curve of continuous acceleration.
 
-    Before the first time and after the last it holds them. The curve is a cubic spline through the
-    quaternions, each with the sign nearer to the one before it, normalized: its path never jumps.
+    The curve is a cubic spline through the quaternions, each with the sign nearer to the one before
+    it, normalized: its path never jumps. By default the motion comes to rest at the first and the
+    last time, whatever the rows near them say, and holds those attitudes before and after; where
+    the rows move there, a warning says so. ``ends`` can be another choice, under which the spline
+    ends with the rate of its rows ("not-a-knot").
     """
 
-    time: Array = gain("s", (None,))
+    time: Array = gain("s", ("row",), form="increasing")
     """Increasing."""
-    attitude: Array = gain(shape=(None, 4))
-    """Quaternion at each time, scalar first, body to inertial; normalized, of either sign."""
+    attitude: Array = gain(shape=("row", 4), form="quaternion")
+    """Quaternion at each time, scalar first, body to inertial, of either sign."""
+    ends: Literal["rest", "continue", "refuse"] = "rest"
+    """At the first and last time: "rest"; "continue" to turn at the rate reached there; or "refuse"
+    to fly a scenario that goes beyond them."""
 
     def __post_init__(self) -> None:
-        if len(self.time) < 2 or len(self.time) != len(self.attitude):
-            raise ValueError(
-                f"{len(self.time)} times for {len(self.attitude)} attitudes: "
-                "give one for each, two or more"
-            )
-        for i in np.flatnonzero(~(np.diff(self.time) > 0.0)):
-            raise ValueError(
-                f"time[{i + 1}] {self.time[i + 1]:g} s is not after time[{i}] {self.time[i]:g} s"
-            )
-        for i in np.flatnonzero(~(np.linalg.norm(self.attitude, axis=-1) > 1e-6)):
-            raise ValueError(f"attitude[{i}] has no direction: give a quaternion")
+        super().__post_init__()
+        if self.ends not in _ENDS:
+            raise ValueError(f"ends: got {self.ends!r}, should be one of {', '.join(_ENDS)}")
+        if len(self.time) < 2:
+            raise ValueError(f"time: got {len(self.time)} rows, should be two or more")
+        if self.ends == "rest" and len(self.time) > 3:
+            self._warn_of_braking()
 
     def at(self, time: Array) -> Reference:
-        """Return the curve at each ``time`` [s], shape (n,)."""
+        """Return the curve at each ``time`` [s], shape (n,).
+
+        Raises:
+            ValueError: a time is outside the table, which is to refuse it.
+        """
         inside = np.clip(time, self.time[0], self.time[-1])
-        s, ds, dds = (self._spline(inside, order) for order in range(3))
-        dds[inside != time] = 0.0
-        # With q = s/|s|, the change of |s| is along q, so in the scalar part of conj(q) q' alone.
-        square = np.sum(s * s, axis=-1, keepdims=True)
-        growth = 2.0 * np.sum(s * ds, axis=-1, keepdims=True) / square
-        rate = 2.0 * att.multiply(att.conjugate(s), ds)[..., 1:] / square
-        bend = 2.0 * att.multiply(att.conjugate(s), dds)[..., 1:] / square
-        return Reference(att.normalize(s), rate, bend - growth * rate)
+        beyond = time - inside
+        if self.ends == "refuse" and (outside := np.abs(beyond) > _TICK).any():
+            raise ValueError(
+                f"time: the table has {self.time[0]:g} to {self.time[-1]:g} s, without "
+                f'{time[outside][0]:g} s: add rows, or set ends to "rest" or "continue"'
+            )
+        attitude, rate, acceleration = _motion(self._spline, inside)
+        acceleration[beyond != 0.0] = 0.0
+        if self.ends == "continue":
+            turned = att.from_rotation_vector(beyond[:, None] * rate)
+            attitude = np.where(beyond[:, None] == 0.0, attitude, att.multiply(attitude, turned))
+        return Reference(attitude, rate, acceleration)
 
     @cached_property
     def _spline(self) -> CubicSpline:
+        return self._curve("clamped" if self.ends == "rest" else "not-a-knot")
+
+    def _curve(self, boundary: str) -> CubicSpline:
         q = att.normalize(self.attitude)
         turns = np.where(np.sum(q[1:] * q[:-1], axis=-1) < 0.0, -1.0, 1.0)
         signs = np.concatenate([[1.0], np.cumprod(turns)])
-        return CubicSpline(self.time, signs[:, None] * q, bc_type="clamped")
+        return CubicSpline(self.time, signs[:, None] * q, bc_type=boundary)
+
+    def _warn_of_braking(self) -> None:
+        _, rate, _ = _motion(self._curve("not-a-knot"), self.time)
+        speed = np.linalg.norm(rate, axis=-1)
+        for row in (0, -1):
+            if speed[row] > _SLOW * speed.max():
+                warnings.warn(
+                    f"the table's rows turn at {speed[row]:.3g} rad/s at {self.time[row]:g} s, "
+                    'where the reference rests: set ends to "continue" or "refuse"',
+                    stacklevel=2,
+                )
+
+
+_ENDS = ("rest", "continue", "refuse")
+
+
+def _motion(spline: CubicSpline, time: Array) -> tuple[Array, Array, Array]:
+    """Return attitude (n, 4), rate [rad/s] and acceleration [rad/s^2] (n, 3) on the spline."""
+    s, ds, dds = (spline(time, order) for order in range(3))
+    # With q = s/|s|, the change of |s| is along q, so in the scalar part of conj(q) q' alone.
+    square = np.sum(s * s, axis=-1, keepdims=True)
+    growth = 2.0 * np.sum(s * ds, axis=-1, keepdims=True) / square
+    rate = 2.0 * att.multiply(att.conjugate(s), ds)[..., 1:] / square
+    bend = 2.0 * att.multiply(att.conjugate(s), dds)[..., 1:] / square
+    return att.normalize(s), rate, bend - growth * rate

@@ -28,11 +28,11 @@ class ThrusterUnloading(Regulator):
     place: h is then that of the closed form at every period's end.
     """
 
-    unloading_gain: float = gain("1/s", default=0.005)
+    unloading_gain: float = gain("1/s", default=0.005, at_least=0.0)
     """kd."""
-    control_period: float = gain("s", default=0.1)
+    control_period: float = gain("s", default=0.1, above=0.0)
     """T; the scenario's, when left out."""
-    feed_forward: float = gain(default=1.0)
+    feed_forward: float = gain(default=1.0, at_least=0.0, at_most=1.0)
     """Part of the thrusters' torque that the wheels are told of: 1 or, to see the error, 0."""
 
     def step(

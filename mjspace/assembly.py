@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mjspace import addresses, central_gravity, deployments, environment, plant
-from mjspace.actuators import Actuators, IdealThrusters, ReactionWheels
+from mjspace.actuators import Actuators, IdealThrusters
 from mjspace.combined_actuators import Together
-from mjspace.components import construct, load_object, source_of
+from mjspace.components import construct, load_object
 from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.deployments import Deployments
 from mjspace.engine import GimballedEngine
@@ -19,14 +19,23 @@ from mjspace.errors import blamed_on
 from mjspace.faults import FaultSet
 from mjspace.geomagnetism import FieldAlongOrbit, along
 from mjspace.gimbal_servos import GimbalServos
+from mjspace.hinge_tables import Friction
 from mjspace.magnetorquers import CoilSet
 from mjspace.motor_drives import MotorDrives
 from mjspace.one_by_one import OneByOne
 from mjspace.plant import Vehicle
+from mjspace.reaction_wheels import ReactionWheels
 from mjspace.scenario import Component, Scenario
 from mjspace.sensors import SensorSuite
 from mjspace.tables import PlantTable, Rates
 from mjspace.thrusters import Thrusters
+from mjspace.user_files import files_of, source_of
+
+METHODS = {
+    "law": ("reset(measurement, reference)", "step(state, time, measurement, reference)"),
+    "reference": ("at(time)",),
+}
+"""What a component must have."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +60,9 @@ class Assembly:
     """Makes a batch's deployments; None where nothing is deployed."""
     disturbance: Callable[..., tuple[Any, Any]] | None
     """The user's own Python disturbance."""
-    sources: dict[str, str]
-    """Texts of the files that define the law, the reference and the disturbance, by role."""
+    sources: dict[str, bytes]
+    """The files that define the law, the reference and the disturbance, as ``law.py``, and with
+    what it needs of its folder in ``law/``: by their names in a log."""
 
     def sensors(self, members: Sequence[int]) -> SensorSuite:
         """Return the sensors of these members of the campaign, each with its own random streams."""
@@ -115,18 +125,18 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         **_of_gimbals(scenario.plant, vehicle),
     }
     flown: dict[str, Any] = {}
-    sources = {}
-    law, flown["law"], sources["law"] = _component("law", scenario.law, facts, law_folder or folder)
-    reference, flown["reference"], sources["reference"] = _component(
-        "reference", scenario.reference, facts, folder
+    sources: dict[str, bytes] = {}
+    law, flown["law"] = _component("law", scenario.law, facts, law_folder or folder, sources)
+    reference, flown["reference"] = _component(
+        "reference", scenario.reference, facts, folder, sources
     )
+    _part("reference", reference.at, np.array([0.0, scenario.duration]))
     disturbance = None
     kind = scenario.environment.python
     if kind is not None:
-        disturbance = _part("environment.python", load_object, kind, folder)
-        sources["disturbance"] = source_of(disturbance)
+        disturbance = _part("environment.python", _function, kind, folder)
         flown["environment"] = scenario.environment.model_copy(
-            update={"python": _in_log("disturbance", kind)}
+            update={"python": _in_log("disturbance", kind, disturbance, sources)}
         )
     qpos, qvel = _part("initial", plant.initial_state, vehicle, scenario.initial)
     parts = scenario.plant.parts
@@ -158,20 +168,41 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
 
 
 def _component(
-    role: str, component: Component, facts: dict[str, Any], folder: Path
-) -> tuple[Any, Component, str]:
-    """Return the law or reference, its table as flown, and the text that defines it."""
+    role: str, component: Component, facts: dict[str, Any], folder: Path, sources: dict[str, bytes]
+) -> tuple[Any, Component]:
+    """Return the law or reference and its table as flown; its files are added to ``sources``."""
     with blamed_on(role):
         kind = load_object(component.kind, folder)
         built, flown = construct(component, kind, facts, folder)
-    flown = flown.model_copy(update={"kind": _in_log(role, component.kind)})
-    return built, flown, source_of(kind)
+        for method in METHODS[role]:
+            if not callable(getattr(built, method.partition("(")[0], None)):
+                raise ValueError(f"{component.kind} has no method {method}")
+    return built, flown.model_copy(update={"kind": _in_log(role, component.kind, kind, sources)})
 
 
-def _in_log(role: str, kind: str) -> str:
-    """Return ``kind`` as the log knows it, where a file of one's own is attached as <role>.py."""
+def _function(kind: str, folder: Path) -> Callable[..., Any]:
+    """Return the function that ``kind`` names; ValueError for anything else."""
+    found = load_object(kind, folder)
+    if not callable(found):
+        raise ValueError(f"{kind} is not a function of (time, truth): {type(found).__name__}")
+    return found  # type: ignore[no-any-return]
+
+
+def _in_log(role: str, kind: str, found: Any, sources: dict[str, bytes]) -> str:
+    """Add the files that define what was ``found``; return its ``kind`` as the log knows it.
+
+    A file of one's own is in the log as <role>.py or, with what it needs of its folder, in <role>/.
+    """
+    text, beside = source_of(found).encode(), files_of(found)
+    sources[f"{role}.py"] = text
     place, _, name = kind.partition(":")
-    return f"{role}.py:{name}" if place.endswith(".py") else kind
+    if not place.endswith(".py"):
+        return kind
+    if not beside:
+        return f"{role}.py:{name}"
+    file = Path(place).name
+    sources |= {f"{role}/{other}": content for other, content in {file: text, **beside}.items()}
+    return f"{role}/{file}:{name}"
 
 
 def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
@@ -185,8 +216,8 @@ def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates) -> Together:
         kinds.append(GimballedEngine.of(vehicle, table.engine))
     others = table.ideal_thrusters or table.rcs or table.magnetorquers
     if table.wheels.axes or not (kinds or others):
-        limits = vehicle.torque_limit, vehicle.speed_limit
-        kinds.append(ReactionWheels(vehicle.wheel_axes, *limits, table.wheels.allocation))
+        alone = not (kinds or others)
+        kinds.append(ReactionWheels.of(vehicle, table.wheels.allocation, alone=alone))
     if table.ideal_thrusters:
         kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
     if table.rcs is not None:
@@ -222,11 +253,11 @@ def _of_gimbals(table: PlantTable, vehicle: Vehicle) -> dict[str, Any]:
     }
 
 
-def _friction(table: PlantTable) -> dict[str, float]:
-    """Return the Coulomb friction of the hinges that have some, by name."""
-    wheels = {f"wheel_{i}": table.wheels.coulomb_friction for i in range(len(table.wheels.axes))}
-    every = wheels | {name: hinge.coulomb_friction for name, hinge in table.hinges.items()}
-    return {name: torque for name, torque in every.items() if torque}
+def _friction(table: PlantTable) -> dict[str, Friction]:
+    """Return the dry friction of the hinges that have some, by name."""
+    wheels = {f"wheel_{i}": table.wheels.friction for i in range(len(table.wheels.axes))}
+    every = wheels | {name: hinge.friction for name, hinge in table.hinges.items()}
+    return {name: friction for name, friction in every.items() if friction is not None}
 
 
 def _part(key: str, build: Callable[..., Any], *arguments: Any) -> Any:

@@ -13,8 +13,15 @@ from typing import Annotated, NoReturn
 import typer
 
 from mjspace.errors import InputError
-from mjspace.options import Json, LogFile, Out, Plot, Set, Video
-from mjspace.terminal import finish, open_log, print_warning, progress_bar, told_in_one_line
+from mjspace.options import Json, LogFile, Out, Plot, Set, Traceback, Video
+from mjspace.terminal import (
+    finish,
+    in_full,
+    open_log,
+    print_warning,
+    progress_bar,
+    told_in_one_line,
+)
 from mjspace.validation.command import validate
 
 app = typer.Typer(
@@ -84,6 +91,7 @@ def run(
     plot_it: Plot = False,
     video: Video = False,
     as_json: Json = False,
+    traceback: Traceback = False,
 ) -> None:
     """Fly a scenario, log it and judge it."""
     from mjspace.assembly import assemble
@@ -91,19 +99,20 @@ def run(
     from mjspace.loading import load
 
     extra = [] if seed is None else [f"seed={seed}"]
-    extra += [f"duration={duration!r}"] if duration else []
+    extra += [f"duration={duration}"] if duration else []
     if every == bool(scenario):
         raise InputError("run: give one SCENARIO, or --all; 'mjspace list' shows them")
     if every:
         if plot_it or video:
             raise InputError("--all: has no pictures; plot and render the logs that matter")
         _run_all([*overrides, *extra], output_folder(out, "all"), as_json)
-    loaded, folder = load(scenario, [*overrides, *extra])
-    assembly = assemble(loaded, folder)
-    with progress_bar(loaded.duration, "flying") as progress:
-        path = output_folder(out, loaded.name) / "flight.mcap"
-        result = fly_to_log(assembly, path, progress=progress)
-    finish(result, plot_it, video, as_json)
+    with in_full(traceback):
+        loaded, folder = load(scenario, [*overrides, *extra])
+        assembly = assemble(loaded, folder)
+        with progress_bar(loaded.duration, "flying") as progress:
+            path = output_folder(out, loaded.name) / "flight.mcap"
+            result = fly_to_log(assembly, path, progress=progress)
+    finish(result, plot_it, video, as_json, traceback)
 
 
 def _run_all(overrides: list[str], out: Path, as_json: bool) -> NoReturn:
@@ -139,6 +148,7 @@ def replay(
     plot_it: Plot = False,
     video: Video = False,
     as_json: Json = False,
+    traceback: Traceback = False,
 ) -> None:
     """Fly a log again: to prove it, or under another law."""
     from mjspace import replay as again
@@ -150,7 +160,7 @@ def replay(
     if verify and law:
         raise InputError("--verify: another law flies another flight: leave --law out")
     logged = open_log(log)
-    with progress_bar(logged.end, "flying") as progress:
+    with in_full(traceback), progress_bar(logged.end, "flying") as progress:
         if verify:
             difference = again.verify(log, start=start, progress=progress)
         else:
@@ -162,11 +172,11 @@ def replay(
                 progress=progress,
             )
     if not verify:
-        finish(result, plot_it, video, as_json)
+        finish(result, plot_it, video, as_json, traceback)
     elif as_json:
         print(json.dumps({"identical": difference is None, "difference": str(difference or "")}))
     else:
-        print(difference or f"identical: every /state from t = {start:g} s to {logged.end:g} s")
+        print(difference or f"identical: every topic from t = {start:g} s to {logged.end:g} s")
     raise typer.Exit(1 if verify and difference else 0)
 
 

@@ -5,9 +5,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace import attitude
+from mjspace import attitude, kepler
 from mjspace.assembly import Assembly
-from mjspace.contract import Array, Measurement
+from mjspace.contract import Array, Measurement, Truth
 from mjspace.sensors import NAVIGATION
 
 PRESSED = 0.001
@@ -37,7 +37,10 @@ class Columns:
         sensors = assembly.scenario.sensors
         self.navigates = any(getattr(sensors, name) is not None for name in NAVIGATION)
         self.has_velocimeter = sensors.ground_velocity is not None
-        self.field = assembly.field if sensors.magnetic_field is not None else None
+        self.has_magnetometer = sensors.magnetic_field is not None
+        self.field = assembly.field
+        orbit = assembly.scenario.environment.orbit
+        self.orbit = None if orbit is None else kepler.pack(orbit)
 
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors see, as views of the state rows where that is possible."""
@@ -49,13 +52,42 @@ class Columns:
             position, velocity = physics[..., self.position], physics[..., self.velocity]
             seen = seen._replace(position=position, velocity=velocity, altitude=position[..., 2:])
         if self.has_velocimeter:
-            to_body = attitude.conjugate(seen.attitude)
-            seen = seen._replace(ground_velocity=attitude.rotate(to_body, seen.velocity))
-        if self.field is not None:
-            field = self.field.at(physics[..., 0])  # the row begins with the time
-            to_body = attitude.conjugate(seen.attitude)
-            seen = seen._replace(magnetic_field=attitude.rotate(to_body, field))
+            seen = seen._replace(ground_velocity=self.velocity_in_body_axes(physics))
+        if self.has_magnetometer:
+            seen = seen._replace(magnetic_field=self.magnetic_field(physics))
         return seen
+
+    def with_surroundings(self, physics: Array, truth: Measurement) -> Truth:
+        """Return all of the ``truth`` at ``physics``, (N, nstate), whatever sensors there are."""
+        position = physics[..., self.position]
+        known = truth._asdict() | {
+            "position": position,
+            "velocity": physics[..., self.velocity],
+            "altitude": position[..., 2:],
+            "ground_velocity": self.velocity_in_body_axes(physics),
+            "magnetic_field": self.magnetic_field(physics),
+        }
+        del known["specific_force"]  # a mean since an accelerometer's last sample
+        vehicles, time = len(physics), float(physics[0, 0])
+        place = np.empty(0) if self.orbit is None else kepler.position(self.orbit, time)
+        motion = np.empty(0) if self.orbit is None else kepler.velocity(self.orbit, time)
+        return Truth(
+            **known,
+            orbit_position=np.tile(place, (vehicles, 1)),
+            orbit_velocity=np.tile(motion, (vehicles, 1)),
+        )
+
+    def velocity_in_body_axes(self, physics: Array) -> Array:
+        """Return the bus's velocity, body axes [m/s]."""
+        to_body = attitude.conjugate(physics[..., self.attitude])
+        return attitude.rotate(to_body, physics[..., self.velocity])
+
+    def magnetic_field(self, physics: Array) -> Array:
+        """Return the Earth's magnetic field, body axes [T]; empty where there is none."""
+        if self.field is None:
+            return physics[..., :0]
+        field = self.field.at(physics[..., 0])  # the row begins with the time
+        return attitude.rotate(attitude.conjugate(physics[..., self.attitude]), field)
 
     def motion(self, physics: Array) -> Measurement:
         """Return the truth of what turns alone: all that motors feel."""

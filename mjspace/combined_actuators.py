@@ -25,9 +25,12 @@ class Together:
         """Whether any must act in every integration step."""
         return any(kind.stateful for kind in self.kinds)
 
-    def masses(self, state: State) -> list[tuple[str, int, Array]]:
-        """Return each field of MuJoCo's model that has changed, its body and the values."""
-        burning = [kind.masses(state) for kind in self.kinds if hasattr(kind, "masses")]
+    def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
+        """Return each field of MuJoCo's model that burning changes, its body and the values.
+
+        They are those in the middle of the integration step from ``before`` to ``after``.
+        """
+        burning = [kind.masses(before, after) for kind in self.kinds if hasattr(kind, "masses")]
         return [(name, *change) for masses in burning for name, change in masses.items()]
 
     def inputs(self, batch: Any, motors: Sequence[str]) -> list[Array]:
@@ -59,14 +62,13 @@ class Together:
         """Return (state, what each kind gives, saturated) as ``Actuators.act`` does.
 
         Raises:
-            FlightError: the command has not what one of them takes.
+            FlightError: a field of the command is missing or misshapen. What an actuator raises
+                itself is passed on as it is.
         """
         given, cut = [], []
         for kind in self.kinds:
-            try:
-                after, torque, saturated = kind.act(state, command, truth, step)
-            except Exception as error:
-                raise FlightError(f"the law's command has no {kind.takes}: {error}") from error
+            _check(command, kind, len(truth.rate))
+            after, torque, saturated = kind.act(state, command, truth, step)
             state = state | after
             given.append(torque)
             cut.append(saturated)
@@ -82,3 +84,42 @@ class Together:
         """Return the fields of /command for what ``act`` gave in several periods."""
         columns = zip(*given, strict=True)
         return {k.logged_as: np.array(c) for k, c in zip(self.kinds, columns, strict=True)}
+
+
+def _check(command: Any, kind: Actuators, vehicles: int) -> None:
+    """Raise FlightError where the law's ``command`` lacks a field that ``kind`` obeys.
+
+    Every field has the vehicle axis first, as the log has.
+    """
+    for name, (width, unit) in kind.takes.items():
+        value = getattr(command, name, None)
+        shape = (vehicles, *((width,) if isinstance(width, int) else width))
+        if isinstance(value, np.ndarray) and value.shape == shape and value.dtype == float:
+            continue  # in a quarter of a microsecond
+        right = f"it must be of shape {_without_vehicles(shape)} [{unit}]"
+        if value is None:
+            has = ", ".join(getattr(command, "_fields", ())) or "none"
+            raise FlightError(
+                f"the law's command, {_a(command)}, has no field {name!r}: {right}; "
+                f"its fields are: {has}"
+            )
+        try:
+            array = np.asarray(value, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise FlightError(
+                f"the law's command: {name} is not numbers ({error}): {right}"
+            ) from error
+        if array.shape != shape:
+            found = (
+                _without_vehicles(array.shape) if array.shape[:1] == (vehicles,) else array.shape
+            )
+            raise FlightError(f"the law's command: {name} has shape {found}: {right}")
+
+
+def _without_vehicles(shape: tuple[int, ...]) -> str:
+    """Return the shape as a law knows it: any vehicle axes, and then one vehicle's."""
+    return f"({', '.join(['...', *map(str, shape[1:])])})"
+
+
+def _a(command: Any) -> str:
+    return f"a {type(command).__name__}"

@@ -2,22 +2,20 @@
 
 import dataclasses
 import difflib
-import hashlib
 import importlib
-import importlib.util
 import inspect
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
-from mjspace.quantity import to_si
+from mjspace.gain_tables import columns
+from mjspace.quantity import quantity_in, to_si
+from mjspace.ranges import numbers, refuse_unfit
 from mjspace.scenario import Component
-
-_SOURCE = "_mjspace_source"  # text of a user's module, whose file may be gone when it is asked for
+from mjspace.user_files import load_file
 
 
 def load_object(kind: str, folder: Path) -> Any:
@@ -31,7 +29,7 @@ def load_object(kind: str, folder: Path) -> Any:
     place, _, name = kind.partition(":")
     if not place or not name:
         raise ValueError(f"{kind!r}: write 'module:Class' or 'file.py:Class'")
-    module = _load_file(folder / place) if place.endswith(".py") else _import(place)
+    module = load_file(folder / place) if place.endswith(".py") else _import(place)
     if not hasattr(module, name):
         have = [key for key, value in vars(module).items() if inspect.isclass(value)]
         raise ValueError(f"{place!r} has no {name!r}{nearest(name, have)}")
@@ -49,12 +47,15 @@ def construct(
     table in a gain that has a ``kind`` is constructed in the same way.
 
     Raises:
-        ValueError: an unknown, missing or misshapen gain, with its name and what would be right.
+        ValueError: an unknown, missing or unfit gain, with its name and what would be right.
     """
     gains = component.gains
     if "file" in gains:
-        gains |= _columns(folder / str(gains.pop("file")))
-    parameters = inspect.signature(kind).parameters
+        read = columns(folder / str(gains.pop("file")))
+        if both := sorted(read.keys() & gains.keys()):
+            raise ValueError(f"{both[0]}: given both here and in the file: give it once")
+        gains |= read
+    parameters = _parameters(kind)
     for name in gains:
         if name not in parameters:
             raise ValueError(f"{name}: {component.kind} has no such key{nearest(name, parameters)}")
@@ -71,7 +72,12 @@ def construct(
     if missing:
         raise ValueError(f"{missing[0]}: missing, and {component.kind} has no default for it")
     declared = {f.name: f.metadata for f in dataclasses.fields(kind)} if _is_data(kind) else {}
-    values = {name: _value(name, v, declared.get(name, {})) for name, v in values.items()}
+    for name, value in values.items():
+        if "unit" in declared.get(name, {}):
+            values[name] = _in_si(name, value, declared[name])
+        elif name not in inside:
+            _refuse_unlike(name, value, parameters[name].annotation, component.kind)
+    refuse_unfit(values, declared)
     built = kind(**values)
     flown = {name: getattr(built, name, values.get(name)) for name in parameters} | written
     return built, Component(kind=component.kind, **{k: plain(v) for k, v in flown.items()})
@@ -96,6 +102,8 @@ def _within(key: str, value: Any, facts: Mapping[str, Any], folder: Path) -> tup
         return {n: built for n, (built, _) in items.items()}, {
             n: flown for n, (_, flown) in items.items()
         }
+    if not isinstance(value["kind"], str):
+        raise ValueError(f"{key}.kind: got {value['kind']!r}, should be text")
     inner = Component.model_validate(value)
     try:
         if inner.kind.partition(":")[0].endswith(".py"):
@@ -107,12 +115,6 @@ def _within(key: str, value: Any, facts: Mapping[str, Any], folder: Path) -> tup
     except ValueError as error:
         raise ValueError(f"{key}: {error}") from error
     return built, {"kind": flown.kind, **flown.gains}
-
-
-def source_of(kind: type) -> str:
-    """Return the text of the file that defines ``kind``."""
-    text = getattr(sys.modules[kind.__module__], _SOURCE, None)
-    return text if text is not None else Path(inspect.getfile(kind)).read_text()
 
 
 def nearest(name: str, names: Any) -> str:
@@ -135,60 +137,47 @@ def _is_data(kind: type) -> bool:
     return dataclasses.is_dataclass(kind)
 
 
-def _value(name: str, value: Any, metadata: Mapping[str, Any]) -> Any:
-    """Return the gain as its declared unit and shape want it; undeclared ones as they are."""
-    if "unit" not in metadata:
-        return value
+def _parameters(kind: type) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters of ``kind``, their annotations as types where those are known."""
     try:
-        array = np.asarray(to_si(value, metadata["unit"]), dtype=float)
-    except (TypeError, ValueError) as error:
+        return inspect.signature(kind, eval_str=True).parameters
+    except NameError:
+        return inspect.signature(kind).parameters
+
+
+def _in_si(name: str, value: Any, declared: Mapping[str, Any]) -> Any:
+    """Return a declared gain in SI: an array, or the one number that it should be."""
+    try:
+        array = numbers(to_si(value, declared["unit"]))
+    except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
-    shape = metadata["shape"]
-    right = len(array.shape) == len(shape) and all(
-        want in (None, have) for want, have in zip(shape, array.shape, strict=True)
-    )
-    if not right:
-        want = " x ".join("n" if size is None else str(size) for size in shape) or "one number"
-        raise ValueError(f"{name}: got an array of shape {array.shape}, wanted {want}")
-    return array if shape else float(array)
+    if array.shape or declared["shape"]:
+        return array
+    number = float(array)
+    return int(number) if declared["range"].whole and number.is_integer() else number
 
 
-def _columns(path: Path) -> dict[str, Any]:
-    """Return a CSV file's columns by their header; ``q0, q1, ...`` become one array ``q``."""
-    try:
-        header = path.read_text().splitlines()[0].lstrip("# ")
-        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except (OSError, IndexError, ValueError) as error:
-        raise ValueError(f"file: {path} is no table of numbers with a header: {error}") from None
-    columns: dict[str, list[Any]] = {}
-    for name, column in zip([c.strip() for c in header.split(",")], rows.T, strict=False):
-        columns.setdefault(name.rstrip("0123456789"), []).append(column)
-    return {
-        name: (parts[0] if len(parts) == 1 else np.stack(parts, axis=-1)).tolist()
-        for name, parts in columns.items()
-    }
-
-
-def _load_file(path: Path) -> ModuleType:
-    if not path.is_file():
-        raise ValueError(f"no file {path}")
-    text = path.read_bytes()
-    # A name of the content's own: two files called law.py do not answer for each other.
-    name = f"mjspace_user_{path.stem}_{hashlib.sha256(text).hexdigest()[:12]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ValueError(f"{path} is no Python file")
-    module = importlib.util.module_from_spec(spec)
-    setattr(module, _SOURCE, text.decode())
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        del sys.modules[name]
-        raise ValueError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
-    return module
+def _refuse_unlike(name: str, value: Any, annotation: Any, kind: str) -> None:
+    """Refuse a value that is not of the type that an undeclared gain is annotated with."""
+    written = quantity_in(value)
+    if written is not None and annotation is not str:
+        unit = written.partition(" ")[2]
+        raise ValueError(
+            f"{name}: got {written!r}, but {kind} declares no unit for it: write a number in SI, "
+            f"or declare {name}: float = gain({unit!r}) in the law (mjspace.contract.gain)"
+        )
+    if get_origin(annotation) is Literal:
+        if value not in get_args(annotation):
+            have = ", ".join(map(repr, get_args(annotation)))
+            raise ValueError(f"{name}: got {value!r}, should be one of {have}")
+        return
+    word = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
+    if annotation not in word:
+        return
+    kinds = (int, float) if annotation is float else annotation
+    right = isinstance(value, kinds) and (annotation is bool or not isinstance(value, bool))
+    if not right or value != value:  # nan is no number
+        raise ValueError(f"{name}: got {value!r}, should be {word[annotation]}")
 
 
 def _import(name: str) -> ModuleType:

@@ -1,10 +1,12 @@
 """What passes between a vehicle, its sensors, a reference and a control law."""
 
-from dataclasses import MISSING, field
+from dataclasses import MISSING, field, fields
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mjspace.ranges import Form, Range, refuse_unfit
 
 Array = NDArray[np.float64]
 
@@ -51,6 +53,34 @@ class Measurement(NamedTuple):
     (..., n)."""
     magnetic_field: Array = np.zeros(0)
     """Of the Earth, body axes [T], shape (..., 3)."""
+
+
+class Truth(NamedTuple):
+    """The true state and surroundings at an instant, as a disturbance in Python receives them.
+
+    Fields that ``Measurement`` has too are described there. They do not depend on the vehicle's
+    sensors; what a vehicle or its environment lacks is of shape ``(0,)``.
+    """
+
+    attitude: Array
+    rate: Array
+    wheel_speed: Array
+    gimbal_angle: Array
+    gimbal_rate: Array
+    current: Array
+    position: Array
+    velocity: Array
+    altitude: Array
+    ground_velocity: Array
+    thrust: Array
+    propellant: Array
+    contact: Array
+    wheel_angle: Array
+    magnetic_field: Array
+    orbit_position: Array
+    """Of the frame's origin from the planet's centre, inertial axes [m], shape (3,)."""
+    orbit_velocity: Array
+    """Of the frame's origin, inertial axes [m/s], shape (3,)."""
 
 
 class Reference(NamedTuple):
@@ -159,16 +189,52 @@ class ReferenceSource(Protocol):
         """
 
 
-def gain(unit: str = "", shape: tuple[int | None, ...] = (), default: Any = MISSING) -> Any:
-    """Declare a law's or a reference's parameter: its SI unit and array shape (None: any length).
+class Gains:
+    """Base of a law or a reference that refuses unfit gains however it is constructed.
 
-    The scenario's loader checks the table against both. A gain without a default that is named
+    A dataclass with a ``__post_init__`` of its own begins it with ``super().__post_init__()``.
+    Without this base the gains are checked by the scenario's loader alone.
+    """
+
+    def __post_init__(self) -> None:
+        """Check the declared gains; ValueError for one that does not fit."""
+        declared: tuple[Any, ...] = fields(self)  # type: ignore[arg-type]
+        refuse_unfit(
+            {f.name: getattr(self, f.name) for f in declared},
+            {f.name: f.metadata for f in declared},
+        )
+
+
+def gain(
+    unit: str = "",
+    shape: tuple[int | str | None, ...] = (),
+    default: Any = MISSING,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = None,
+    whole: bool = False,
+    form: Form = "",
+) -> Any:
+    """Declare a law's or a reference's parameter: its SI unit, array shape and range.
+
+    In ``shape``, None is any length, and a name is a length that all gains with that name share:
+    ``("wheel", 3)`` and ``("wheel",)``. Every number has to be finite and within ``above`` or
+    ``at_least`` and ``below`` or ``at_most``; ``at_most=inf`` admits infinity, for a limit that may
+    be absent. ``whole`` admits whole numbers only. ``form`` is what the array has to be as a whole:
+    an "inertia" (symmetric, positive definite), or rows that are each a "direction" (not zero), a
+    "unit vector" or a "quaternion" (of norm 1 to 1e-3), or "increasing" values.
+
+    The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
+    constructed in Python. A gain without a default that is named
     like one of the plant's properties (``inertia``, ``wheel_axes``, ``wheel_inertia``; with gimbals
     that have speed loops ``gimbal_axes`` and ``spin_axes``), or
     ``control_period`` or ``inner_period``, may be left out of the table: it is then taken from the
     vehicle as flown.
     """
-    metadata = {"unit": unit, "shape": shape}
+    limits = Range(above, at_least, below, at_most, whole)
+    metadata = {"unit": unit, "shape": shape, "range": limits, "form": form}
     if default is MISSING:
         return field(metadata=metadata)
     if shape:

@@ -10,7 +10,7 @@ from mjspace.fields import Positive, Si, Table
 class Pmsm(Table):
     """A permanent-magnet synchronous motor, as two windings at right angles."""
 
-    pole_pairs: Annotated[int, Field(ge=1)]
+    pole_pairs: Annotated[int, Field(ge=1, strict=True)]
     """Electrical turns in one of the rotor."""
     resistance: Annotated[Positive, Si("ohm")]
     """Of each winding."""

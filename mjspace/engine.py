@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numba import guvectorize
 
-from mjspace.actuators import State
+from mjspace.actuators import Fields, State
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
 from mjspace.landing_tables import Engine
@@ -31,7 +31,7 @@ class GimballedEngine:
     """At the start [kg]."""
 
     logged_as: ClassVar[str] = "engine"
-    takes: ClassVar[str] = "thrust of shape (..., 1) [N] and gimbal of shape (..., 2) [rad]"
+    takes: ClassVar[Fields] = {"thrust": (1, "N"), "gimbal": (2, "rad")}
     acts_on: ClassVar[str] = "ctrl"
     stateful: ClassVar[bool] = True
 
@@ -91,11 +91,15 @@ class GimballedEngine:
         """Return the truth with thrust and what is left in the tank."""
         return truth._replace(thrust=state["thrust"], propellant=state["propellant"])
 
-    def masses(self, state: State) -> dict[str, tuple[int, Array]]:
-        """Return, of MuJoCo's model, the body and the values of each field that burning changes."""
+    def masses(self, before: State, after: State) -> dict[str, tuple[int, Array]]:
+        """Return, of MuJoCo's model, the body and the values of each field that burning changes.
+
+        They are those in the middle of the integration step that leads from ``before`` to
+        ``after``: with them a constant thrust gives Tsiolkovsky's velocity to second order.
+        """
         if not self.tank:
             return {}
-        left = np.maximum(state["propellant"], DRY)
+        left = np.maximum(0.5 * (before["propellant"] + after["propellant"]), DRY)
         return {
             "body_mass": (self.tank, left[:, 0]),
             "body_inertia": (self.tank, left * self.full),

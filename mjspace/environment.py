@@ -12,10 +12,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mjspace import central_gravity, kepler, struct_offsets
+from mjspace import bearing_friction, central_gravity, kepler, struct_offsets
 from mjspace import environment_kernel as kernel
 from mjspace.contract import Array
 from mjspace.environment_tables import DisturbanceTorque, Environment, Orbit
+from mjspace.hinge_tables import Friction
 from mjspace.tables import Ripple
 
 SENSOR = "environment"
@@ -43,26 +44,27 @@ def _callbacks() -> tuple[Any, Any]:
 
 
 def userdata_size(
-    environment: Environment, friction: Mapping[str, float], ripple: Mapping[str, Ripple] = {}
+    environment: Environment, friction: Mapping[str, Friction], ripple: Mapping[str, Ripple] = {}
 ) -> int:
     """Return the ``nuserdata`` that a model needs for ``userdata`` with the same arguments.
 
     Raises:
         ValueError: the orbit meets the planet.
     """
-    return kernel.HEADER + sum(block.size for block in _blocks(environment, friction, ripple, {}))
+    size = np.zeros(bearing_friction.WIDTH * len(friction))
+    return kernel.HEADER + sum(block.size for block in _blocks(environment, size, ripple, {}))
 
 
 def userdata(
     model: Any,
     environment: Environment,
-    friction: Mapping[str, float],
+    friction: Mapping[str, Friction],
     ripple: Mapping[str, Ripple] = {},
 ) -> Array:
     """Return a vehicle's ``userdata``, shape (model.nuserdata,).
 
-    ``friction`` is the Coulomb friction [N m] of hinges, ``ripple`` their motors' torque ripple, by
-    name. The bus is the body of the first free joint.
+    ``friction`` is the dry friction of hinges, ``ripple`` their motors' torque ripple, by name. The
+    bus is the body of the first free joint.
 
     Raises:
         ValueError: the model has no free joint, no such hinge, no passive forces, too little
@@ -82,7 +84,9 @@ def userdata(
         raise ValueError(f"the model's nuserdata is {model.nuserdata}: {needed} are needed")
     hinges = {name: _hinge(model, name) for name in (*friction, *ripple)}
     header = np.array([kernel.MAGIC, model.nv, model.jnt_dofadr[free[0]], _sensor_address(model)])
-    packed = np.concatenate([header, *_blocks(environment, friction, ripple, hinges)])
+    dofs = [hinges[name][0] for name in friction]
+    frictions = bearing_friction.pack(model, friction, dofs)
+    packed = np.concatenate([header, *_blocks(environment, frictions, ripple, hinges)])
     return np.pad(packed, (0, model.nuserdata - packed.size))
 
 
@@ -102,7 +106,7 @@ def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
 
 def _blocks(
     environment: Environment,
-    friction: Mapping[str, float],
+    friction: Array,
     ripple: Mapping[str, Ripple],
     hinges: Mapping[str, tuple[int, int]],
 ) -> list[Array]:
@@ -117,9 +121,8 @@ def _blocks(
     for torque in environment.torques:
         kind = kernel.BODY_TORQUE if torque.frame == "body" else kernel.INERTIAL_TORQUE
         blocks.append(_block(kind, _pack_torque(torque)))
-    if friction:
-        pairs = [(hinges.get(name, (0, 0))[0], c) for name, c in friction.items()]
-        blocks.append(_block(kernel.FRICTION, np.ravel(pairs)))
+    if friction.size:
+        blocks.append(_block(kernel.FRICTION, friction))
     if ripple:
         rows = [
             (*hinges.get(name, (0, 0)), r.amplitude, r.cycles, r.phase)

@@ -25,7 +25,7 @@ from mjspace.struct_offsets import DataOffsets, ModelOffsets
 
 MAGIC = 6.02214076e23
 HEADER = 4
-ORBIT, BODY_TORQUE, INERTIAL_TORQUE, FRICTION, RIPPLE, GRAVITY = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
+ORBIT, BODY_TORQUE, INERTIAL_TORQUE, FRICTION, RIPPLE, GRAVITY = 1.0, 2.0, 3.0, 8.0, 5.0, 6.0
 MAGNETIC = 7.0  # the first block where there is one, so that it is known where it stands:
 FIELD = slice(HEADER + 2, HEADER + 15)
 MOMENT = slice(HEADER + 15, HEADER + 18)

@@ -1,10 +1,12 @@
 """The tables of what acts on a vehicle from outside."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from mjspace.fields import Angle, Angles3, Positive, Si, Table, Torque3
+from mjspace.constants import RADIUS
+from mjspace.fields import Angles3, Finite, Positive, Si, Table, Torque3, WithinTurn
 from mjspace.landing_tables import CentralGravity
 from mjspace.magnetic_tables import MagneticField
 
@@ -16,16 +18,28 @@ class Orbit(Table):
     """What is orbited."""
     semi_major_axis: Annotated[Positive, Si("m")]
     """From the body's centre."""
-    eccentricity: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    eccentricity: Annotated[Finite, Field(ge=0, lt=1)] = 0.0
     """0 is a circle."""
-    inclination: Angle = 0.0
-    """To the inertial x-y plane."""
-    ascending_node: Angle = 0.0
+    inclination: Annotated[Finite, Field(ge=0, le=math.pi), Si("rad")] = 0.0
+    """To the inertial x-y plane; above 90 deg the orbit is retrograde."""
+    ascending_node: WithinTurn = 0.0
     """Right ascension of the ascending node."""
-    periapsis: Angle = 0.0
+    periapsis: WithinTurn = 0.0
     """Argument of periapsis."""
-    true_anomaly: Angle = 0.0
+    true_anomaly: WithinTurn = 0.0
     """At time zero."""
+
+    @model_validator(mode="after")
+    def _above_the_planet(self) -> "Orbit":
+        lowest, radius = self.semi_major_axis * (1.0 - self.eccentricity), RADIUS[self.body]
+        if lowest <= radius:
+            meant = f": did you mean '{self.semi_major_axis:.10g} km'?"
+            raise ValueError(
+                f"semi_major_axis: got {self.semi_major_axis:.10g} m, with which the periapsis, "
+                f"{lowest:.6g} m from the centre, is inside the {self.body}, whose radius is "
+                f"{radius:.6g} m{meant if 1e3 * lowest > radius else ''}"
+            )
+        return self
 
 
 class Sine(Table):

@@ -8,9 +8,6 @@ from typing import Any
 
 from numba import njit
 
-FRICTION_SPEED = 0.1
-"""Speed [rad/s] over which Coulomb friction is smoothed through zero."""
-
 
 @njit(cache=True, error_model="numpy")
 def torque_at(series: Any, time: float) -> tuple[float, float, float]:
@@ -72,11 +69,14 @@ def field_of(piece: Any, axis: int, since: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def friction(pairs: Any, vehicle: Any) -> None:
-    """Add -c tanh(speed / FRICTION_SPEED) [N m] to hinges, given as dof, c, dof, c..."""
-    for i in range(0, pairs.size, 2):
-        dof = int(pairs[i])
-        vehicle.qfrc_passive[dof] -= pairs[i + 1] * math.tanh(vehicle.qvel[dof] / FRICTION_SPEED)
+def friction(hinges: Any, vehicle: Any) -> None:
+    """Add dry friction [N m] to hinges, as ``bearing_friction.pack`` has packed it."""
+    for i in range(0, hinges.size, 5):
+        dof, torque = int(hinges[i]), hinges[i + 1]
+        speed = vehicle.qvel[dof]
+        if hinges[i + 2] > 0.0:
+            torque += hinges[i + 2] * math.exp(-((speed / hinges[i + 3]) ** 2))
+        vehicle.qfrc_passive[dof] -= torque * math.tanh(speed / hinges[i + 4])
 
 
 @njit(cache=True, error_model="numpy")

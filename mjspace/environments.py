@@ -6,7 +6,7 @@ MuJoCo's warnings go to its log.
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,15 @@ import numpy as np
 from dm_env.specs import BoundedArray
 
 from mjspace import attitude, dm_bridge, environment, loading
-from mjspace.actuators import ReactionWheels
 from mjspace.assembly import Assembly, assemble
 from mjspace.columns import Columns
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.errors import InputError
 from mjspace.held_disturbance import HeldDisturbance
+from mjspace.reaction_wheels import ReactionWheels
 from mjspace.simulation import BLOCK_PERIODS
 from mjspace.start import INTEGRATION, first_start, last_period
+from mjspace.user_code import reference_at
 
 TOLERATED_ERROR = np.radians(1.0)
 """Attitude error [rad] that earns the full reward where no check of the scenario bounds it."""
@@ -59,7 +60,7 @@ class Physics(dm_bridge.Physics):  # type: ignore[misc]
 
     def __init__(self, assembly: Assembly) -> None:
         self._columns = Columns(assembly)
-        self._disturbance = assembly.disturbance
+        self._assembly = assembly
         self._momentum = assembly.vehicle.momentum
         self._rates = assembly.scenario.rates
         self._start = first_start(assembly, [0]).physics[0]
@@ -88,8 +89,8 @@ class Physics(dm_bridge.Physics):  # type: ignore[misc]
         end = self._steps + nstep
         while self._steps < end:
             count = min(self._tick - self._steps % self._tick, end - self._steps)
-            if self._disturbance is not None:
-                self._push(self._disturbance)
+            if self._assembly.disturbance is not None:
+                self._push()
                 count = 1
             mujoco.mj_step(self.model.ptr, self.data.ptr, count)
             self._steps += count
@@ -126,12 +127,13 @@ class Physics(dm_bridge.Physics):  # type: ignore[misc]
                 self._sensors, self._steps, self._truth()
             )
 
-    def _push(self, disturbance: Callable[..., Any]) -> None:
+    def _push(self) -> None:
         """Apply the user's own disturbance, held over one integration step."""
         period, step = divmod(self._steps, self._period)
         now = self._steps * self._rates.physics if step else period * self._rates.control
         applied = self.data.xfrc_applied[self.model.name2id("bus", "body")]
-        HeldDisturbance(disturbance, applied[None])(now, self._truth())
+        push = HeldDisturbance(self._assembly, self._columns, applied[None])
+        push(now, self.get_state(INTEGRATION)[None], self._truth())
 
 
 class Tracking(dm_bridge.Task):  # type: ignore[misc]
@@ -160,7 +162,7 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
             first = number * BLOCK_PERIODS
             end = min(first + BLOCK_PERIODS, self._last + 1)
             times = np.arange(first, end, dtype=np.float64) * self._control
-            return assembly.reference.at(times)
+            return reference_at(assembly.reference, times)
 
         self._block = block
 
@@ -183,7 +185,7 @@ class Tracking(dm_bridge.Task):  # type: ignore[misc]
         """Share the torque ``action`` among the wheels, for one control period."""
         with np.errstate(all="ignore"):
             torque, _ = self._wheels.motor_torque(
-                np.asarray(action, dtype=float), physics.truth().wheel_speed
+                np.asarray(action, dtype=float), physics.truth().wheel_speed, self._control
             )
         physics.set_control(torque)
 

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import field_validator, model_validator
 
-from mjspace.fields import Seconds, Table, Time
+from mjspace.fields import Finite, Seconds, Table, Time
 from mjspace.quantity import any_to_si
 from mjspace.regions import Region
 
@@ -21,7 +21,7 @@ class Fault(Table):
     """It gives nothing; what it gave when the fault began; ``value`` more; ``value`` times as much;
     what it should have given ``value`` seconds before; noise of standard deviation ``value``
     more."""
-    value: float | None = None
+    value: Finite | None = None
     """Of all kinds but dead and stuck; a number in SI or a quantity."""
     at: Time | None = None
     """When it begins: at the first control period that is not before."""

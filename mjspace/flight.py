@@ -32,6 +32,8 @@ class Result:
     """Why it ended early; empty for a flight that reached its end."""
     signal: int
     """The signal that ended it, 0 for none."""
+    error: FlightError | None = None
+    """The error that ended it; its ``__cause__`` is what the user's own code raised."""
 
     @property
     def passed(self) -> bool:
@@ -89,7 +91,7 @@ def fly_to_log(
         OSError: the log cannot be written (any more); it keeps what it has.
     """
     start = start or first_start(assembly, [member])
-    trouble = ""
+    trouble, ended_by = "", None
     with on_signals() as stop:
         blocks = fly(assembly, start, [member], stop=stop)
         first = next(blocks)
@@ -101,7 +103,7 @@ def fly_to_log(
                     recorder.write(block)
                     progress(float(block.time[-1]))
             except FlightError as error:
-                trouble = str(error)
+                trouble, ended_by = str(error), error
             if stop():
                 trouble = f"interrupted by signal {stop.signal} at t = {recorder.time:.6g} s"
             if trouble:
@@ -110,4 +112,4 @@ def fly_to_log(
             verdicts = judge(Log(path), assembly.scenario.checks, assembly.scenario.events)
             for verdict in verdicts:
                 recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
-    return Result(path, verdicts, trouble, stop.signal)
+    return Result(path, verdicts, trouble, stop.signal, ended_by)

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numba import guvectorize
 
-from mjspace.actuators import State
+from mjspace.actuators import Fields, State
 from mjspace.contract import Array, Measurement
 from mjspace.plant import Vehicle
 from mjspace.servo_tables import Servos
@@ -44,9 +44,9 @@ class GimbalServos:
         return cls(np.array(loops), np.full(wheels, table.wheel_speed), np.array(order))
 
     @property
-    def takes(self) -> str:
-        """What a command must have."""
-        return f"gimbal_rate of shape (..., {len(self.order) - len(self.wheel_speed)}) [rad/s]"
+    def takes(self) -> Fields:
+        """The fields of a command."""
+        return {"gimbal_rate": (len(self.order) - len(self.wheel_speed), "rad/s")}
 
     def reset(self, vehicles: int) -> State:
         """Return integrals of zero: "servo_integral" (N, m) [rad], of gimbals and then wheels."""

@@ -109,8 +109,7 @@ def _stiff_joints(model: Any) -> Iterator[str]:
     if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
         return
     damping, stiffness = _servo(model)
-    # What a torque between two bodies has to move: the inertia seen from the joint.
-    inertia = 1.0 / np.diag(np.linalg.inv(mass_matrix(model))) if model.nv else np.zeros(0)
+    inertia = inertia_at_joints(model)
     step = model.opt.timestep
     for dof in np.flatnonzero((damping > 0.0) | (stiffness > 0.0)):
         if model.jnt_type[model.dof_jntid[dof]] == mujoco.mjtJoint.mjJNT_FREE:
@@ -188,6 +187,11 @@ def _servo(model: Any) -> tuple[Array, Array]:
             stiffness[dof] -= gear * model.actuator_biasprm[actuator, 1]
             damping[dof] -= gear * model.actuator_biasprm[actuator, 2]
     return damping, stiffness
+
+
+def inertia_at_joints(model: Any) -> Array:
+    """Return, for each dof, what a torque between the joint's two bodies has to move, (nv,)."""
+    return 1.0 / np.diag(np.linalg.inv(mass_matrix(model))) if model.nv else np.zeros(0)
 
 
 def mass_matrix(model: Any) -> Array:

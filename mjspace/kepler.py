@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from mjspace.constants import GM, RADIUS
+from mjspace.constants import GM
 from mjspace.contract import Array
 from mjspace.environment_tables import Orbit
 
@@ -16,16 +16,8 @@ def pack(orbit: Orbit) -> Array:
 
     GM [m^3/s^2], mean motion [rad/s], mean anomaly at time zero [rad], eccentricity, then the two
     semi-axes as vectors [m], towards the periapsis and along the motion there.
-
-    Raises:
-        ValueError: the orbit meets the planet.
     """
     a, e = orbit.semi_major_axis, orbit.eccentricity
-    if a * (1.0 - e) <= RADIUS[orbit.body]:
-        raise ValueError(
-            f"environment.orbit: the periapsis, {a * (1.0 - e):.6g} m from the centre, is inside "
-            f"the {orbit.body} (radius {RADIUS[orbit.body]:.6g} m): give a larger semi_major_axis"
-        )
     gm = GM[orbit.body]
     half = math.atan2(
         math.sqrt(1.0 - e) * math.sin(0.5 * orbit.true_anomaly),
@@ -68,6 +60,19 @@ def position(orbit: Any, time: float) -> tuple[float, float, float]:
     """
     anomaly = eccentric_anomaly(orbit[2] + orbit[1] * time, orbit[3])
     along, across = math.cos(anomaly) - orbit[3], math.sin(anomaly)
+    return (
+        along * orbit[4] + across * orbit[7],
+        along * orbit[5] + across * orbit[8],
+        along * orbit[6] + across * orbit[9],
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
+    """Return the velocity [m/s], inertial axes, at ``time`` [s]; ``orbit`` as for ``position``."""
+    anomaly = eccentric_anomaly(orbit[2] + orbit[1] * time, orbit[3])
+    rate = orbit[1] / (1.0 - orbit[3] * math.cos(anomaly))
+    along, across = -rate * math.sin(anomaly), rate * math.cos(anomaly)
     return (
         along * orbit[4] + across * orbit[7],
         along * orbit[5] + across * orbit[8],

@@ -1,10 +1,11 @@
 """The tables of a landing in a scenario: gravity at the site, the ground, the engine."""
 
+import math
 from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from mjspace.fields import Angle, NonNegative, Positive, Seconds, Si, Table, Time
+from mjspace.fields import NonNegative, Positive, Seconds, Si, Table, Time, WithinTurn
 
 
 class CentralGravity(Table):
@@ -26,9 +27,9 @@ class Ground(Table):
 
     part: str = "moon_plain"
     """Name of a folder in assets/parts/ with a geom called ``ground``."""
-    slope: Angle = 0.0
+    slope: Annotated[NonNegative, Field(lt=0.5 * math.pi), Si("rad")] = 0.0
     """How steep it is at the site."""
-    downhill: Angle = 0.0
+    downhill: WithinTurn = 0.0
     """Where the slope leads down to: from x towards y."""
 
 
@@ -49,7 +50,7 @@ class Engine(Table):
     """Thrust over the weight of the propellant's flow, on Earth; burns nothing when left out."""
     propellant: Annotated[Positive, Si("kg")] | None = None
     """In the tank at the start, the body ``tank``; the model's own when left out."""
-    gimbal_limit: Annotated[Positive, Si("rad")] = 0.35
+    gimbal_limit: Annotated[Positive, Field(le=math.pi), Si("rad")] = 0.35
     """Largest deflection of each gimbal that is asked for."""
     gimbal_rate_limit: Annotated[Positive, Si("rad/s")] | None = None
     """Fastest rate that is asked for; none when left out."""

@@ -1,7 +1,9 @@
 """Reading scenarios: find the file, apply overrides, validate, say in one line what is wrong."""
 
 import difflib
+import re
 import tomllib
+import warnings
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Any, get_args
 import tomli_w
 from pydantic import BaseModel, ValidationError
 
+from mjspace import overrides as keys
 from mjspace.components import nearest, plain
 from mjspace.errors import InputError
 from mjspace.scenario import Component, Scenario
@@ -27,35 +30,53 @@ def load(scenario: str | Path, overrides: Iterable[str] = ()) -> tuple[Scenario,
     A file may say ``base``: another scenario, by its name or by a path from the file's folder,
     whose tables it changes key by key. A table of another ``kind`` replaces the base's as a whole.
     ``overrides``, which come last, are ``key=value`` with a dotted key and a TOML value; a bare
-    word is a string.
+    word is a string. Under an overriding ``duration``, checks whose window begins after the
+    flight's end are left out, with a warning; in a file they are an error.
 
     Raises:
         InputError: no such scenario, no TOML, or a key that is wrong; one line.
     """
     path = _find(str(scenario))
     table = _read(path, ())
-    origins = {}
-    for override in overrides:
-        origins[_override(table, override)] = f"--set {override}"
-    return validate(table, str(path), origins), path.parent
+    origins = keys.apply(table, overrides)
+    cut = {"cut_short": "duration" in origins}
+    found = validate(table, str(path), origins, context=cut)
+    late = [check for check in found.checks if check.begins_too_late(found.duration)]
+    if late:
+        names = ", ".join(repr(check.name) for check in late)
+        warnings.warn(
+            f"checks that begin after the flight's end, {found.duration:g} s, left out: {names}",
+            stacklevel=2,
+        )
+        kept = [check for check in found.checks if check not in late]
+        found = found.model_copy(update={"checks": kept})
+    return found, path.parent
 
 
-def validate(table: dict[str, Any], where: str, origins: Mapping[str, str] = {}) -> Scenario:
+def validate(
+    table: dict[str, Any],
+    where: str,
+    origins: Mapping[str, str] = {},
+    context: Mapping[str, bool] = {},
+) -> Scenario:
     """Return the scenario that ``table`` holds.
 
+    Under the ``context`` "flown" it is that of a log, under "cut_short" checks may begin after the
+    flight's end.
+
     Raises:
-        InputError: one line with the file (or the option that set the key), the key, what was found
-            and what would be right.
+        InputError: one line with all that is wrong: the file (or the option that set the key), the
+            key, what was found and what would be right.
     """
     try:
-        return Scenario.model_validate(table)
+        return Scenario.model_validate(table, context=dict(context))
     except ValidationError as error:
-        problems = error.errors()
-        first = problems[0]
-        key = ".".join(str(part) for part in first["loc"])
-        source = next((o for k, o in origins.items() if _related(k, key)), where)
-        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-        raise InputError(f"{source}: {_explain(key, first)}{more}") from None
+        told: dict[str, list[str]] = {}
+        for problem in error.errors():
+            key = ".".join(str(part) for part in problem["loc"])
+            source = next((o for k, o in origins.items() if _related(k, key)), where)
+            told.setdefault(source, []).append(_explain(key, problem))
+        raise InputError("; ".join(f"{s}: {'; '.join(p)}" for s, p in told.items())) from None
 
 
 def component(kind: str, gains: Iterable[str]) -> Component:
@@ -65,8 +86,7 @@ def component(kind: str, gains: Iterable[str]) -> Component:
         InputError: not of that form.
     """
     table: dict[str, Any] = {"kind": kind}
-    for gain in gains:
-        _override(table, gain, "--gain")
+    keys.apply(table, gains, "--gain")
     return Component.model_validate(table)
 
 
@@ -82,6 +102,9 @@ def _read(path: Path, upon: tuple[Path, ...]) -> dict[str, Any]:
         table = tomllib.loads(path.read_text())
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path}: {error}") from None
+    if not table.keys() & {"base", *Scenario.model_fields}:
+        have = ", ".join(table) or "nothing"
+        raise InputError(f"{path} is not a scenario: it has {have}, but no duration or law")
     table.setdefault("name", path.stem)
     if "base" not in table:
         return table
@@ -110,46 +133,34 @@ def _merged(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_path(scenario: str) -> bool:
-    return scenario.endswith(".toml") or "/" in scenario
+    return "/" in scenario or bool(Path(scenario).suffix)
 
 
 def _find(scenario: str) -> Path:
+    path = Path(scenario)
+    if scenario in scenario_names():
+        return Path(str(resources.files("mjspace.scenarios") / f"{scenario}.toml"))
+    if path.is_dir():
+        raise InputError(f"{scenario} is a folder: give a scenario's name or its TOML file")
+    if path.is_file() and path.suffix != ".toml":
+        raise InputError(f"{scenario} is not a scenario, a TOML file: {_purpose(path)}")
     if _is_path(scenario):
-        if not Path(scenario).is_file():
+        if not path.is_file():
             raise InputError(f"no scenario file {scenario}")
-        return Path(scenario)
-    if scenario not in scenario_names():
-        near = difflib.get_close_matches(scenario, scenario_names(), n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise InputError(f"no scenario {scenario!r}: {hint}'mjspace list' shows them")
-    return Path(str(resources.files("mjspace.scenarios") / f"{scenario}.toml"))
+        return path
+    near = difflib.get_close_matches(scenario, scenario_names(), n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise InputError(f"no scenario {scenario!r}: {hint}'mjspace list' shows them")
 
 
-def _override(table: dict[str, Any], override: str, option: str = "--set") -> str:
-    key, equals, text = override.partition("=")
-    key = key.strip()
-    if not equals or not key:
-        raise InputError(f"{option} {override}: write key=value")
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
-    *parents, last = key.split(".")
-    place: Any = table
-    for part in parents:
-        if isinstance(place, list) and part.isdigit() and int(part) < len(place):
-            place = place[int(part)]
-        elif isinstance(place, dict):
-            place = place.setdefault(part, {})
-        else:
-            raise InputError(f"{option} {override}: {part!r} is not in a table")
-    if isinstance(place, list) and last.isdigit() and int(last) < len(place):
-        place[int(last)] = value
-    elif isinstance(place, dict):
-        place[last] = value
-    else:
-        raise InputError(f"{option} {override}: {last!r} is not in a table")
-    return key
+def _purpose(path: Path) -> str:
+    """Return what a file that is no scenario is for."""
+    return {
+        ".mcap": "it is the log of a flight, for 'mjspace replay', 'info', 'plot' or 'render'",
+        ".xml": "a model is checked by 'mjspace validate --model', and named in [plant] model",
+        ".urdf": "a model is checked by 'mjspace validate --model', and named in [plant] model",
+        ".py": f'a law in it is named in a scenario\'s [law], as kind = "{path.name}:Class"',
+    }.get(path.suffix, "'mjspace list' shows those that come with mjspace")
 
 
 def _related(one: str, other: str) -> bool:
@@ -157,17 +168,33 @@ def _related(one: str, other: str) -> bool:
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 
+_SHOULD_BE = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": "text",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "finite_number": "finite",
+}
+
+
 def _explain(key: str, problem: Any) -> str:
-    found = problem.get("input")
     if problem["type"] == "extra_forbidden":
         *parents, last = problem["loc"]
         return f"{key}: no such key{nearest(str(last), _keys_at(parents))}"
     if problem["type"] == "missing":
         return f"{key}: missing"
     if problem["type"] == "value_error":
-        return f"{key}: {problem['ctx']['error']}" if key else str(problem["ctx"]["error"])
+        text = str(problem["ctx"]["error"])
+        within = re.match(r"\w+", text)
+        inner = key and within and within[0] in _keys_at(list(problem["loc"]))
+        return f"{key}{'.' if inner else ': '}{text}" if key else text
     message = problem["msg"].replace("Input should", "should").replace("List should", "should")
-    return f"{key}: got {found!r}, {message}"
+    if problem["type"] in _SHOULD_BE:
+        message = f"should be {_SHOULD_BE[problem['type']]}"
+    return f"{key}: got {problem['input']!r}, {message}"
 
 
 def _keys_at(parents: list[Any]) -> list[str]:

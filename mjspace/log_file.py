@@ -1,7 +1,7 @@
 """An MCAP file that grows by chunks, compressed and written by one background thread."""
 
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -54,9 +54,7 @@ class LogFile:
         }
         note = record_bytes(Metadata(NAME, dict(metadata)))
         head = MAGIC + record_bytes(Header("", NAME))
-        self._inventory = {
-            Opcode.METADATA_INDEX: record_bytes(MetadataIndex(len(head), len(note), NAME))
-        }
+        self._metadata_indexes = [MetadataIndex(len(head), len(note), NAME)]
         head += note + b"".join(self._registry.values())
         indexes = []
         for name, (media_type, data) in attachments.items():
@@ -65,7 +63,7 @@ class LogFile:
                 AttachmentIndex(len(head), len(record), 0, 0, len(data), name, media_type)
             )
             head += record
-        self._inventory[Opcode.ATTACHMENT_INDEX] = record_bytes(*indexes)
+        self._attachment_indexes = indexes
         self._statistics = Statistics(
             attachment_count=len(attachments),
             channel_count=len(channels),
@@ -89,16 +87,29 @@ class LogFile:
             self._file.close()
             raise
 
-    def add_chunk(self, parts: Sequence[Part]) -> None:
-        """Have ``parts`` written as one chunk; waits when the disk is two chunks behind."""
+    def add_chunk(self, parts: Sequence[Part], then: Callable[[], None] = lambda: None) -> None:
+        """Have ``parts`` written as one chunk; waits when the disk is two chunks behind.
+
+        ``then`` is called by the thread that writes, after the chunk.
+        """
         while self._writing and (self._writing[0].done() or len(self._writing) == _IN_FLIGHT):
             self._writing.popleft().result()
-        self._writing.append(self._thread.submit(self._write_chunk, parts))
+        self._writing.append(self._thread.submit(self._write_chunk, parts, then))
 
     def flush(self) -> None:
         """Wait until every chunk given so far is with the operating system."""
         while self._writing:
             self._writing.popleft().result()
+
+    def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
+        """Write a metadata record after every chunk given so far, unless the file is closed."""
+        if self._file.closed:
+            return
+        self.flush()
+        record = record_bytes(Metadata(name, dict(metadata)))
+        self._metadata_indexes.append(MetadataIndex(self._position, len(record), name))
+        self._statistics.metadata_count += 1
+        self._put(record)
 
     def close(self) -> None:
         """Write what still waits and the summary, and close the file; again does nothing."""
@@ -111,11 +122,12 @@ class LogFile:
             self._thread.shutdown()
             self._file.close()
 
-    def _write_chunk(self, parts: Sequence[Part]) -> None:
+    def _write_chunk(self, parts: Sequence[Part], then: Callable[[], None]) -> None:
         data, index, counts = encode(parts, self._position)
         self._put(data)
         self._chunk_indexes += record_bytes(index)
         self._count(index, counts)
+        then()
 
     def _count(self, index: ChunkIndex, counts: Mapping[int, int]) -> None:
         seen = self._statistics
@@ -146,7 +158,8 @@ class LogFile:
             **self._registry,
             Opcode.STATISTICS: record_bytes(self._statistics),
             Opcode.CHUNK_INDEX: bytes(self._chunk_indexes),
-            **self._inventory,
+            Opcode.METADATA_INDEX: record_bytes(*self._metadata_indexes),
+            Opcode.ATTACHMENT_INDEX: record_bytes(*self._attachment_indexes),
         }
         data_end = record_bytes(DataEnd(0))
         start = self._position + len(data_end)

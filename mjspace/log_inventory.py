@@ -1,7 +1,7 @@
 """What lies where in a log's file, complete or cut short anywhere: a walk over its records."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from struct import Struct
 from typing import BinaryIO, NamedTuple
@@ -13,6 +13,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Metadata, Schema
 
 from mjspace.log_chunk import INDEX
+from mjspace.log_digest import RECORD
 from mjspace.log_file import MAGIC, NAME
 
 _RECORD = Struct("<BQ")  # opcode, length of the content that follows
@@ -33,6 +34,7 @@ class Inventory(NamedTuple):
     """All of a log but its messages and attachments, and where those are."""
 
     metadata: dict[str, str]
+    digests: dict[str, str]
     attachments: dict[str, int]
     schemas: dict[int, Schema]
     channels: dict[str, Channel]
@@ -47,7 +49,7 @@ def inventory(path: Path) -> Inventory:
         OSError: the file cannot be read.
         ValueError: it is no MCAP file, or no log of mjspace.
     """
-    found = Inventory({}, {}, {}, {}, [], complete=False)
+    found = Inventory({}, {}, {}, {}, {}, [], complete=False)
     ours = complete = False
     with path.open("rb", buffering=0) as file:
         if file.read(len(MAGIC)) != MAGIC:
@@ -75,6 +77,8 @@ def inventory(path: Path) -> Inventory:
                 if note.name == NAME:
                     found.metadata.update(note.metadata)
                     ours = True
+                elif note.name == RECORD:
+                    found.digests.update(note.metadata)
             elif opcode == Opcode.DATA_END:
                 file.seek(-len(MAGIC), io.SEEK_END)
                 complete = file.read() == MAGIC
@@ -93,14 +97,18 @@ def read_attachment(path: Path, position: int) -> bytes:
         return attached.data
 
 
-def read_messages(file: BinaryIO, place: ChunkPlace, channel: int) -> list[bytes]:
-    """Return a chunk's Message records on one channel, each whole.
+def read_messages(
+    file: BinaryIO, place: ChunkPlace, channels: Collection[int]
+) -> dict[int, list[bytes]]:
+    """Return a chunk's Message records on each of ``channels`` that it has, each record whole.
 
     Raises:
         ValueError: the chunk is damaged, or compressed by another method than zstd.
     """
-    if place.indexes is not None and channel not in place.indexes:
-        return []
+    if place.indexes is not None:
+        channels = [channel for channel in channels if channel in place.indexes]
+        if not channels:
+            return {}
     file.seek(place.position)
     chunk = Chunk.read(ReadDataStream(file))
     if chunk.compression not in ("", "zstd"):
@@ -111,13 +119,20 @@ def read_messages(file: BinaryIO, place: ChunkPlace, channel: int) -> list[bytes
             data = zstandard.decompress(data, max_output_size=chunk.uncompressed_size)
         except zstandard.ZstdError as error:
             raise ValueError(f"the chunk at byte {place.position} is damaged: {error}") from None
+    offsets: dict[int, list[int]] = {channel: [] for channel in channels}
     if place.indexes is None:
-        offsets = [offset for offset, number in _messages(data) if number == channel]
+        for offset, number in _messages(data):
+            if number in offsets:
+                offsets[number].append(offset)
     else:
-        file.seek(place.indexes[channel] + 2)
-        size = int.from_bytes(file.read(4), "little")
-        offsets = np.frombuffer(file.read(size), INDEX)["offset"].tolist()
-    return [data[at : at + 9 + _RECORD.unpack_from(data, at)[1]] for at in offsets]
+        for channel in channels:
+            file.seek(place.indexes[channel] + 2)
+            size = int.from_bytes(file.read(4), "little")
+            offsets[channel] = np.frombuffer(file.read(size), INDEX)["offset"].tolist()
+    return {
+        channel: [data[at : at + 9 + _RECORD.unpack_from(data, at)[1]] for at in places]
+        for channel, places in offsets.items()
+    }
 
 
 def _walk(file: BinaryIO) -> Iterator[tuple[int, int]]:

@@ -12,6 +12,7 @@ from foxglove_schemas_protobuf.Log_pb2 import Log as LogMessage
 from numpy.typing import NDArray
 
 from mjspace.contract import Array
+from mjspace.log_digest import RowDigests
 from mjspace.log_inventory import ChunkPlace, inventory, read_attachment, read_messages
 from mjspace.log_layout import HEADER, doubles
 from mjspace.log_schema import PERIODIC, field_names
@@ -154,6 +155,23 @@ class Log:
         best = np.abs(rows["header"]["log_time"].astype(np.int64) - stamp).argmin()
         return _columns(rows[best], names)
 
+    def altered(self) -> list[str] | None:
+        """Return the topics whose rows are not those that were written, by the log's digests.
+
+        None: not known, as of a log that was cut short.
+
+        Raises:
+            ValueError: a chunk is damaged.
+        """
+        if not (self.complete and self._found.digests):
+            return None
+        found = RowDigests(self.topics)
+        for messages in self._messages(self.topics, self._found.chunks):
+            for topic, records in messages.items():
+                found.add_messages(topic, records)
+        now, written = found.by_topic(), self._found.digests
+        return [topic for topic in written | now if now.get(topic) != written.get(topic)]
+
     def events(self) -> list[Event]:
         """Return the entries of /events, in the order in which they were logged."""
         events = []
@@ -198,17 +216,21 @@ class Log:
             yield np.frombuffer(b"".join(records), dtype)
 
     def _records(self, topic: str, places: Iterable[ChunkPlace]) -> Iterator[list[bytes]]:
-        if topic not in self._found.channels:
-            return
-        number = self._found.channels[topic].id
+        for messages in self._messages([topic], places):
+            yield from messages.values()
+
+    def _messages(
+        self, topics: Iterable[str], places: Iterable[ChunkPlace]
+    ) -> Iterator[dict[str, list[bytes]]]:
+        """Yield the message records that each of ``places`` has on each of ``topics``, if any."""
+        channels = {self._found.channels[t].id: t for t in topics if t in self._found.channels}
         with self.path.open("rb") as file:
             for place in places:
                 try:
-                    records = read_messages(file, place, number)
+                    messages = read_messages(file, place, channels)
                 except ValueError as error:
                     raise ValueError(f"{self.path}: {error}") from None
-                if records:
-                    yield records
+                yield {channels[number]: records for number, records in messages.items() if records}
 
 
 def _columns(rows: Any, names: Sequence[str]) -> dict[str, Array]:

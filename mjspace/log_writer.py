@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mjspace.contract import Array
 from mjspace.log_chunk import Nanoseconds, Part, block, message
+from mjspace.log_digest import RECORD, RowDigests
 from mjspace.log_file import LogFile
 from mjspace.log_layout import Fields, doubles, side_by_side, transforms, varint5
 from mjspace.log_schema import Scene, channels
@@ -52,6 +53,7 @@ class LogWriter:
         self._count = 0
         self._last = -1
         self._pending: list[Part] = []
+        self._digests = RowDigests(topics)
         self._file = LogFile(path, schemas, declared, metadata, attachments)
 
     def write(self, time: Array, rows: Mapping[str, Mapping[str, Array]]) -> None:
@@ -84,7 +86,7 @@ class LogWriter:
         self._last = int(stamps[-1])
         periodic = {topic: self._channels[topic] for topic in self._topics}
         parts, self._pending = [block(records, periodic, stamps), *self._pending], []
-        self._file.add_chunk(parts)
+        self._file.add_chunk(parts, lambda: self._digests.add_rows(records))
 
     def write_transforms(self, time: Array, positions: Array, quaternions: Array) -> None:
         """Log the scene's bodies in ``world`` on /tf, with the next chunk.
@@ -132,6 +134,7 @@ class LogWriter:
         """
         try:
             self.flush()
+            self._file.add_metadata(RECORD, self._digests.by_topic())
         finally:
             self._file.close()
 

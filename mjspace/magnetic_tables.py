@@ -1,12 +1,12 @@
 """The tables of what is magnetic in a scenario: the Earth's field, and the magnetorquers in it."""
 
+import math
 from datetime import UTC, datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field, field_validator
 
-from mjspace.fields import Angle, Positive, Si, Table, Time, Unit3
+from mjspace.fields import NonNegative, Positive, Si, Table, Time, Unit3
 
 
 class MagneticField(Table):
@@ -17,8 +17,15 @@ class MagneticField(Table):
     epoch: datetime = datetime(2025, 1, 1)
     """Time zero, UTC: which way the Earth has turned by then and, with ``igrf``, of which day the
     field is; 1900 to 2030."""
-    tilt: Angle | None = None
+    tilt: Annotated[NonNegative, Field(le=math.pi), Si("rad")] | None = None
     """Of the dipole to the Earth's axis; the Earth's own when left out."""
+
+    @field_validator("epoch", mode="before")
+    @classmethod
+    def _written_out(cls, epoch: Any) -> Any:
+        if isinstance(epoch, int | float) or (isinstance(epoch, str) and "-" not in epoch):
+            raise ValueError(f"got {epoch!r}, should be a date as in 2025-01-01T12:00:00")
+        return epoch
 
     @field_validator("epoch")
     @classmethod
@@ -38,10 +45,3 @@ class Magnetorquers(Table):
     """Largest magnetic moment of each; none when left out."""
     time_constant: Time = 0.0
     """With which the moment follows its command."""
-
-    @field_validator("axes")
-    @classmethod
-    def _directed(cls, axes: list[list[float]]) -> list[list[float]]:
-        if any(np.linalg.norm(axis) < 1e-9 for axis in axes):
-            raise ValueError("an axis has no direction")
-        return axes

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numba import guvectorize
 
-from mjspace.actuators import State
+from mjspace.actuators import Fields, State
 from mjspace.contract import Array, Measurement
 
 
@@ -26,7 +26,7 @@ class CoilSet:
     time_constant: float = 0.0
     """With which each follows its command [s]."""
     logged_as: ClassVar[str] = "magnetic_moment"
-    takes: ClassVar[str] = "dipole of shape (..., 3) [A m^2]"
+    takes: ClassVar[Fields] = {"dipole": (3, "A m^2")}
     acts_on: ClassVar[str] = "userdata"
     allocation: Array = field(init=False, repr=False)
     """Moments of the coils for each unit of the whole, shape (n, 3)."""

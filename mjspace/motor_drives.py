@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from mjspace.actuators import State
+from mjspace.actuators import Fields, State
 from mjspace.contract import Array, Measurement
 from mjspace.drive_tables import Pmsm
 from mjspace.plant import Vehicle
@@ -22,7 +22,6 @@ class MotorDrives:
     """Where each motor's speed is among gimbal rates and wheel speeds, shape (m,)."""
 
     logged_as: ClassVar[str] = "motor_torque"
-    takes: ClassVar[str] = "voltage of shape (..., motors, 2) [V]"
     acts_on: ClassVar[str] = "ctrl"
     stateful: ClassVar[bool] = True
 
@@ -32,6 +31,11 @@ class MotorDrives:
         sensed = [*vehicle.gimbal_dof, *vehicle.wheel_dof]
         order = [sensed.index(dof) for dof in vehicle.drive_dof]
         return cls(Drives.of(tables), np.array(order))
+
+    @property
+    def takes(self) -> Fields:
+        """The fields of a command."""
+        return {"voltage": ((len(self.order), 2), "V")}
 
     def reset(self, vehicles: int) -> State:
         """Return currents of zero: "current", (N, m, 2) [A]."""

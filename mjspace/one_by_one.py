@@ -1,10 +1,13 @@
 """Flying a law that knows nothing of batches: one vehicle at a time, stacked again."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mjspace.contract import Law, Measurement, Wanted
+from mjspace.errors import FlightError
+from mjspace.user_code import check_state, check_step
 
 
 class OneByOne:
@@ -15,7 +18,10 @@ class OneByOne:
 
     def reset(self, measurement: Measurement, reference: Wanted) -> Any:
         """Return the law's state with a vehicle axis."""
-        return _stack([self._law.reset(one, reference) for one in _vehicles(measurement)])
+        states = [self._law.reset(one, reference) for one in _vehicles(measurement)]
+        for state in states:
+            check_state(state)
+        return _stack("state", states)
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Wanted
@@ -26,19 +32,30 @@ class OneByOne:
             self._law.step(s, time, m, reference)
             for s, m in zip(states, _vehicles(measurement), strict=True)
         ]
-        return (
-            _stack([f[0] for f in flown]),
-            _stack([f[1] for f in flown]),
-            _stack([f[2] for f in flown]),
-        )
+        for returned in flown:
+            check_step(returned)
+        after, commands, signals = zip(*flown, strict=True)
+        return _stack("state", after), _stack("command", commands), _stack("signals", signals)
 
 
 def _vehicles(arrays: Any) -> list[Any]:
     return [type(arrays)(*row) for row in zip(*arrays, strict=True)]
 
 
-def _stack(tuples: list[Any]) -> Any:
-    """Return the named tuples as one, a vehicle axis before each field; None is an empty tuple."""
-    if tuples[0] is None:
+def _stack(name: str, tuples: Sequence[Any]) -> Any:
+    """Return the named tuples as one, a vehicle axis before each field; None is an empty tuple.
+
+    Raises:
+        FlightError: a field is not numeric, or differs in shape between vehicles.
+    """
+    if not tuples[0]:
         return ()
-    return type(tuples[0])(*(np.array(field, dtype=float) for field in zip(*tuples, strict=True)))
+    fields = []
+    for field, column in zip(tuples[0]._fields, zip(*tuples, strict=True), strict=True):
+        try:
+            fields.append(np.array(column, dtype=float))
+        except (TypeError, ValueError) as error:
+            raise FlightError(
+                f"the law's {name}.{field} is not an array of numbers: {error}"
+            ) from error
+    return type(tuples[0])(*fields)

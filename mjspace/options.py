@@ -16,4 +16,7 @@ Out = Annotated[
     typer.Option("--out", help="Folder to write; runs/<scenario>/<UTC stamp> when left out."),
 ]
 Plot = Annotated[bool, typer.Option("--plot", help="Also plot the log: flight.png.")]
+Traceback = Annotated[
+    bool, typer.Option("--traceback", help="Show what your own code raised in full.")
+]
 Video = Annotated[bool, typer.Option("--video", help="Also render the log: flight.mp4.")]

@@ -70,18 +70,22 @@ def to_si(value: Any, unit: str) -> Any:
     lists are converted element by element and anything else is returned as it is.
 
     Raises:
-        ValueError: the string is no number with a unit, or the unit measures something else.
+        ValueError: the string is not a number with a unit, or the unit measures something else.
     """
     if isinstance(value, list | tuple):
         return [to_si(item, unit) for item in value]
     if not isinstance(value, str):
         return value
+    right = [name for name, (si, _) in UNITS.items() if si == unit]
     magnitude, written = _split(value)
+    if not right:
+        raise ValueError(f"got the text {value!r}, should be a plain number")
     if not written:
-        return magnitude
-    if written not in UNITS or UNITS[written][0] != unit:
-        right = ", ".join(name for name, (si, _) in UNITS.items() if si == unit)
-        raise ValueError(f"{value!r} has the unit {written!r}: wanted {right or 'a plain number'}")
+        raise ValueError(
+            f"{value!r} has no unit: write a plain number for {unit}, or one of {', '.join(right)}"
+        )
+    if written not in right:
+        raise ValueError(f"{value!r} has the unit {written!r}, should be one of {', '.join(right)}")
     return magnitude * UNITS[written][1]
 
 
@@ -89,26 +93,38 @@ def any_to_si(value: str) -> float:
     """Return the quantity ``value`` in the SI unit of whatever it measures.
 
     Raises:
-        ValueError: no number, or an unknown unit.
+        ValueError: not a number with a unit, or an unknown unit.
     """
     magnitude, written = _split(value)
-    if written and written not in UNITS:
-        raise ValueError(f"{value!r} has the unknown unit {written!r}: have {', '.join(UNITS)}")
-    return magnitude * UNITS[written][1] if written else magnitude
+    if written not in UNITS:
+        what = f"the unknown unit {written!r}" if written else "no unit"
+        raise ValueError(f"{value!r} has {what}: have {', '.join(UNITS)}, or write a plain number")
+    return magnitude * UNITS[written][1]
+
+
+def quantity_in(value: Any) -> str | None:
+    """Return the first string in nested lists that is a number with a known unit; None if none."""
+    if isinstance(value, list | tuple):
+        return next((found for item in value if (found := quantity_in(item))), None)
+    try:
+        return value if isinstance(value, str) and _split(value)[1] in UNITS else None
+    except ValueError:
+        return None
 
 
 def whole_number(span: float, unit: float, span_key: str, unit_key: str) -> int:
     """Return how many ``unit`` [s] make up ``span`` [s].
 
     Raises:
-        ValueError: not a whole number of them, with both keys and the nearest that would do.
+        ValueError: not a whole number of them, with both keys and the nearest right values.
     """
     count = round(span / unit)
     if count < 1 or abs(span / unit - count) > 1e-6:
-        near = max(count, 1) * unit
+        below = math.floor(span / unit)
+        near = [f"{n * unit:.10g} s" for n in (below, below + 1) if n > 0]
         raise ValueError(
-            f"{span_key} {span:g} s is no whole number of {unit_key} {unit:g} s: "
-            f"{near:g} s would be"
+            f"{span_key}: {span:.10g} s is not a whole number of {unit_key}, {unit:.10g} s: "
+            f"the nearest are {' and '.join(near)}"
         )
     return count
 
@@ -118,4 +134,6 @@ def _split(value: str) -> tuple[float, str]:
     try:
         return float(number), " ".join(written.split())
     except ValueError:
-        raise ValueError(f"{value!r} is no quantity: write a number and a unit") from None
+        raise ValueError(
+            f"got the text {value!r}, should be a number, or one with a unit"
+        ) from None

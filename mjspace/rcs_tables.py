@@ -39,8 +39,6 @@ class Rcs(Table):
                 f"directions: {len(self.directions)} rows for {len(self.positions)} positions: "
                 "give as many"
             )
-        if any(np.linalg.norm(direction) < 1e-9 for direction in self.directions):
-            raise ValueError("directions: one has no length")
         if (self.specific_impulse is None) != (self.propellant is None):
             raise ValueError("specific_impulse and propellant: give both or neither")
         return self

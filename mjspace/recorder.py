@@ -94,8 +94,10 @@ class Recorder:
             "scenario.toml": ("application/toml", to_toml(assembly.scenario).encode()),
             "foxglove_layout.json": ("application/json", foxglove_layout.layout()),
         }
-        for role, text in assembly.sources.items():
-            attachments[f"{role}.py"] = ("text/x-python", text.encode())
+        for name, content in assembly.sources.items():
+            is_code = name.endswith(".py")
+            media_type = "text/x-python" if is_code else "application/octet-stream"
+            attachments[name] = (media_type, content)
         self._log = LogWriter(
             path,
             shapes(first),

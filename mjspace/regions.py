@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import field_validator, model_validator
 
 from mjspace.contract import Array
-from mjspace.fields import Table
+from mjspace.fields import Finite, Table
 from mjspace.quantity import any_to_si
 
 
@@ -17,9 +17,9 @@ class Region(Table):
     signal: str
     """``topic.field`` or ``topic.field[i]`` of the log: ``truth.attitude_error``; of a vector its
     norm."""
-    below: float | None = None
+    below: Finite | None = None
     """It must be less; a number in SI or a quantity."""
-    above: float | None = None
+    above: Finite | None = None
     """It must be greater; a number in SI or a quantity."""
 
     @field_validator("below", "above", mode="before")
@@ -31,6 +31,11 @@ class Region(Table):
     def _bounded(self) -> Self:
         if self.below is None and self.above is None:
             raise ValueError("neither below nor above is given: a region must have an outside")
+        if self.below is not None and self.above is not None and self.below <= self.above:
+            raise ValueError(
+                f"below {self.below:g} and above {self.above:g}: nothing is inside, "
+                "below should be the larger"
+            )
         return self
 
     def admits(self, value: Array | float) -> NDArray[np.bool_]:

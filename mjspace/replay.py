@@ -1,11 +1,14 @@
 """Flying again from a log alone: to prove it bit for bit, or to see what another law would do."""
 
 import dataclasses
+import math
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -20,7 +23,8 @@ from mjspace.log_reader import Log
 from mjspace.scenario import Component, Scenario
 from mjspace.simulation import fly
 from mjspace.start import Start
-from mjspace.tape import one_vehicle
+from mjspace.tape import Block, Rows, one_vehicle, shapes
+from mjspace.user_code import reference_at
 
 SOURCES = ("law", "reference", "disturbance")
 
@@ -30,6 +34,7 @@ class Difference:
     """Where a repeated flight first differs from its log."""
 
     time: float
+    topic: str
     field: str
     index: int
     logged: float
@@ -38,7 +43,7 @@ class Difference:
     def __str__(self) -> str:
         """Return it as one line."""
         return (
-            f"/state.{self.field}[{self.index}] differs first at t = {self.time:.6g} s: "
+            f"{self.topic}.{self.field}[{self.index}] differs first at t = {self.time:.6g} s: "
             f"logged {self.logged!r}, flown {self.flown!r}"
         )
 
@@ -75,27 +80,35 @@ def replay(
 def verify(
     log_path: str | Path, *, start: float = 0.0, progress: Progress = lambda time: None
 ) -> Difference | None:
-    """Fly a log again from ``start`` [s]; return where ``/state`` first differs, None if nowhere.
+    """Fly a log again from ``start`` [s]; return where it first differs, None if nowhere.
+
+    Every field of every topic is compared bit for bit, those of ``/state`` first.
 
     Raises:
-        InputError: no such log or time.
+        InputError: no such log or time, or rows that the log's own digests do not know.
         FlightError: the repeated flight cannot go on where the logged one could.
     """
     with blamed_on("log"):
         log = Log(log_path)
+        altered = log.altered()
+    if altered:
+        raise InputError(
+            f"log: {', '.join(altered)} changed since the flight, by the log's digests"
+        )
     with assembly_of(log) as assembly:
         begin = start_of(log, assembly, start)
         for block in fly(assembly, begin, [int(log.metadata["member"])]):
-            rows = one_vehicle(block)["/state"]
-            logged = log.read("/state", start=block.time[0], end=block.time[-1])
-            if not len(logged["time"]):
-                break  # the log ended with the block before: its flight was interrupted
-            found = _first_difference(logged, rows)
+            flown = one_vehicle(block)
+            _check_topics(log, block)
+            logged = {
+                topic: log.read(topic, start=block.time[0], end=block.time[-1]) for topic in flown
+            }
+            found = first_difference(logged, flown)
             if found is not None:
                 return found
             progress(float(block.time[-1]))
-            if len(logged["time"]) < len(block.time):
-                break
+            if len(logged["/state"]["time"]) < len(block.time):
+                break  # the log ends here: its flight was interrupted
     return None
 
 
@@ -115,12 +128,22 @@ def assembly_of(
     if law is not None:
         scenario = _without_signals_of_the_law(scenario).model_copy(update={"law": law})
     with tempfile.TemporaryDirectory() as own:
-        for role in SOURCES:
-            if f"{role}.py" in log.attachments:
-                (Path(own) / f"{role}.py").write_bytes(log.attachment(f"{role}.py"))
+        _unpack(log, Path(own))
         assembly = assemble(scenario, Path(own), law_folder=None if law is None else folder)
         model = plant.from_bytes(log.attachment("model.mjb.gz"))
         yield dataclasses.replace(assembly, vehicle=plant.on_model(assembly.vehicle, model))
+
+
+def _unpack(log: Log, own: Path) -> None:
+    """Write the files of one's own that the log holds, ``law.py`` or ``law/helpers.py``."""
+    for name in log.attachments:
+        if name.partition("/")[0].removesuffix(".py") not in SOURCES:
+            continue
+        file = own / name
+        if not file.resolve().is_relative_to(own.resolve()):
+            raise InputError(f"log: the attachment {name!r} leads out of its folder")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(log.attachment(name))
 
 
 def _without_signals_of_the_law(scenario: Scenario) -> Scenario:
@@ -155,7 +178,7 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     law_state: Any = None
     if not fresh_law:
         seen = log.read("/measurement", None, *near)
-        wanted = assembly.reference.at(np.array([number * period]))
+        wanted = reference_at(assembly.reference, np.array([number * period]))
         template = assembly.law.reset(
             Measurement(**{n: seen.get(n, np.zeros((1, 0))) for n in Measurement._fields}),
             type(wanted)(*(values[0] for values in wanted)),
@@ -168,22 +191,47 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     return Start(number, state["physics"], sensors, law_state, actuators)
 
 
-def _first_difference(logged: dict[str, Any], flown: dict[str, Any]) -> Difference | None:
-    found: tuple[int, str, int] | None = None
-    n = len(logged["time"])
-    for name, rows in flown.items():
-        a = np.ascontiguousarray(logged[name]).reshape(n, -1)
-        b = np.ascontiguousarray(rows[:n]).reshape(n, -1)
-        places = np.argwhere(a.view(np.uint64) != b.view(np.uint64))
-        if len(places) and (found is None or places[0][0] < found[0]):
-            found = (int(places[0][0]), name, int(places[0][1]))
-    if found is None:
-        return None
-    k, name, i = found
-    return Difference(
-        float(logged["time"][k]),
-        name,
-        i,
-        float(logged[name].reshape(n, -1)[k, i]),
-        float(flown[name][:n].reshape(n, -1)[k, i]),
-    )
+def _check_topics(log: Log, block: Block) -> None:
+    """Refuse a log whose topics are not those of the flight again, as of another version."""
+    flown = shapes(block)
+    for topic in flown | log.topics:
+        if flown.get(topic) != log.topics.get(topic):
+            raise InputError(
+                f"log: {topic} holds {log.topics.get(topic)}, flown again {flown.get(topic)}: "
+                "another version of mjspace wrote it"
+            )
+
+
+def first_difference(logged: Rows, flown: Rows) -> Difference | None:
+    """Return where ``flown`` first differs from ``logged``, which has ``time`` in each topic.
+
+    ``logged`` may end earlier. Of one instant the first topic and field count, in the flown order.
+    """
+    found: Difference | None = None
+    for topic, fields in flown.items():
+        time = logged[topic]["time"]
+        n = len(time)
+        for name, rows in fields.items():
+            width = math.prod(rows.shape[1:])
+            a, b = (
+                np.ascontiguousarray(both[:n]).reshape(n, width)
+                for both in (logged[topic][name], rows)
+            )
+            places = np.argwhere(a.view(np.uint64) != b.view(np.uint64))
+            if len(places) and (found is None or time[places[0][0]] < found.time):
+                k, i = map(int, places[0])
+                found = Difference(float(time[k]), topic, name, i, float(a[k, i]), float(b[k, i]))
+    return found
+
+
+class _Callable(ModuleType):
+    """This module, once imported, is what ``mjspace.replay`` names: it flies as the function does.
+
+    A package's attribute is the submodule of that name, whatever the package defines itself.
+    """
+
+    def __call__(self, *arguments: Any, **options: Any) -> Result:
+        return replay(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _Callable

@@ -77,6 +77,7 @@ def log_data(log: Log) -> dict[str, Any]:
     return {
         "metadata": dict(log.metadata),
         "complete": log.complete,
+        "altered": log.altered(),
         "start": log.start,
         "end": log.end,
         "topics": {
@@ -103,6 +104,10 @@ def print_log(log: Log) -> None:
         listed = (f"{name} {'x'.join(map(str, shape)) or 1}" for name, shape in fields.items())
         table.add_row(topic, ", ".join(listed))
     table.add_row("attachments", ", ".join(sorted(log.attachments)))
+    altered = log.altered()
+    if altered is not None:
+        changed = f"[bold red]{', '.join(altered)} changed since the flight[/]"
+        table.add_row("digests", changed if altered else "every topic as it was written")
     console.print(table)
     for time, level, message in log.events():
         console.print(

@@ -1,16 +1,28 @@
 """A scenario, whole: what flies, where, under which law, how long, and what it must show."""
 
-from typing import Annotated, Any, Literal, Self
+import math
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+import numpy as np
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from mjspace.environment_tables import Environment
 from mjspace.fault_tables import Fault
-from mjspace.fields import Seconds, Table, Time
-from mjspace.quantity import whole_number
+from mjspace.fields import Count, Seconds, Table, Time, Truth
+from mjspace.quantity import any_to_si, whole_number
+from mjspace.ranges import numbers
 from mjspace.regions import Region
 from mjspace.sensor_tables import Sensors
 from mjspace.tables import Initial, PlantTable, Rates
+
+_TICK = 1e-9
+"""s: what the log's stamps can tell apart."""
 
 
 class Component(BaseModel):
@@ -58,8 +70,9 @@ class Check(Watched):
     until: str | None = None
     """Name of an event: the window ends before it first happened."""
     target: float | list[float] | None = None
-    """Taken from the signal first, so that the statistic is of an error."""
-    relative: bool = False
+    """Taken from the signal first, so that the statistic is of an error; numbers in SI or
+    quantities."""
+    relative: Truth = False
     """The error is divided by the norm of ``target``."""
     expected: Literal["PASS", "FAIL"] = "PASS"
     """How the check comes out when all is well: FAIL of what the flight shows not to hold. The
@@ -95,11 +108,40 @@ class Check(Watched):
             raise ValueError('because goes with expected = "FAIL"')
         return self
 
+    @field_validator("target", mode="before")
+    @classmethod
+    def _numbers(cls, value: Any) -> Any:
+        if value is None:
+            return None
+        items = value if isinstance(value, list | tuple) else [value]
+        found = numbers([any_to_si(item) if isinstance(item, str) else item for item in items])
+        if found.ndim != 1 or not len(found) or not np.isfinite(found).all():
+            raise ValueError(f"got {value!r}, should be a finite number or a list of them")
+        return found.tolist() if isinstance(value, list | tuple) else float(found[0])
+
     @model_validator(mode="after")
     def _of_an_error(self) -> Self:
         if self.relative and self.target is None:
-            raise ValueError("relative needs a target")
+            raise ValueError("relative: needs a target")
+        if self.relative and not np.any(self.target):
+            raise ValueError("relative: the target is zero, by which no error can be divided")
         return self
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.end is not None and self.end < self.start:
+            raise ValueError(f"start: {self.start:g} s is after end, {self.end:g} s")
+        return self
+
+    def begins_too_late(self, duration: float) -> bool:
+        """Return whether a flight of ``duration`` [s] ends before the window begins."""
+        return self.start > duration + _TICK
+
+    def is_between_samples(self, period: float) -> bool:
+        """Return whether the window lies between two instants of a log of that ``period`` [s]."""
+        if self.end is None or self.since is not None:
+            return False
+        return math.floor((self.end + _TICK) / period) * period < self.start - _TICK
 
 
 class Scenario(Table):
@@ -111,7 +153,7 @@ class Scenario(Table):
     """One line: what the flight shows."""
     source: str = ""
     """Where its numbers come from."""
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Count = 0
     """Of every random stream."""
     duration: Seconds
     """Simulated time."""
@@ -158,7 +200,7 @@ class Scenario(Table):
         return self
 
     @model_validator(mode="after")
-    def _whole_periods(self) -> "Scenario":
+    def _whole_periods(self, info: ValidationInfo) -> "Scenario":
         step = self.rates.physics
         spans: dict[str, float | None] = {"rates.control": self.rates.control}
         for name, sensor in self.sensors:
@@ -166,6 +208,34 @@ class Scenario(Table):
         for key, span in spans.items():
             if span is not None:
                 whole_number(span, step, key, "rates.physics")
-        if self.duration < self.rates.control:
-            raise ValueError(f"duration {self.duration:g} s is less than one control period")
+        if not _is_flown(info):
+            whole_number(self.duration, self.rates.control, "duration", "rates.control")
         return self
+
+    @model_validator(mode="after")
+    def _windows_with_samples(self, info: ValidationInfo) -> "Scenario":
+        if _is_flown(info):
+            return self
+        period = self.rates.control
+        for number, check in enumerate(self.checks):
+            if check.begins_too_late(self.duration) and not _is_cut_short(info):
+                raise ValueError(
+                    f"checks.{number}.start: {check.start:g} s is after the flight's end, duration "
+                    f"{self.duration:g} s"
+                )
+            if check.is_between_samples(period):
+                raise ValueError(
+                    f"checks.{number}: nothing is logged from {check.start:g} to {check.end:g} s, "
+                    f"but every {period:g} s (rates.control)"
+                )
+        return self
+
+
+def _is_flown(info: ValidationInfo) -> bool:
+    """Return whether the scenario is a log's, whose flight is judged again as it was."""
+    return bool((info.context or {}).get("flown"))
+
+
+def _is_cut_short(info: ValidationInfo) -> bool:
+    """Return whether a duration on the command line may leave checks without a window."""
+    return bool((info.context or {}).get("cut_short"))

@@ -19,6 +19,15 @@ from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.start import Start, last_period
 from mjspace.tape import Block, Tape, until_trouble
+from mjspace.user_code import (
+    check_same_shapes,
+    check_state,
+    check_step,
+    check_vehicle_axis,
+    failure,
+    read_only,
+    reference_at,
+)
 
 BLOCK_PERIODS = 500
 BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
@@ -50,16 +59,18 @@ def fly(
     period = start.period
     while period <= last:
         tape, trouble = flight.record(period, last, stop)
-        if not len(tape):
-            raise FlightError(trouble)
+        if trouble is not None and not len(tape):
+            raise trouble
         block, problem = until_trouble(
             tape.block(assembly, flight.columns, saturated), flight.columns
         )
         if len(block.time):
             block, inside = with_crossings(block, declared, inside)
             yield block
-        if problem or trouble:
-            raise FlightError(problem or trouble)
+        if problem:
+            raise FlightError(problem)
+        if trouble is not None:
+            raise trouble
         if stop():
             return
         saturated = tape.saturated[-1].astype(bool)
@@ -95,11 +106,12 @@ class _Flight:
         self.actuators, self.actuator_state = assembly.actuators, start.actuators
         self.faults = assembly.faults(members)
         self.inner = getattr(assembly.law, "inner", None)
+        self.returned: Any = None
         self.push = None
         if assembly.disturbance is not None:
             bus = assembly.vehicle.model.body("bus").id
             applied = self.batch.bind("xfrc_applied")[:, bus]
-            self.push = HeldDisturbance(assembly.disturbance, applied)
+            self.push = HeldDisturbance(assembly, self.columns, applied)
         self.hold = assembly.hold
         self.driven_stepwise = assembly.driven_stepwise
         acts = self.push is not None or self.deployments is not None
@@ -109,11 +121,14 @@ class _Flight:
         recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
         self.periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
 
-    def record(self, first: int, last: int, stop: Callable[[], bool]) -> tuple[Tape, str]:
-        """Fly a block of periods and return the tape, and why it cannot go on ('' where it can)."""
+    def record(
+        self, first: int, last: int, stop: Callable[[], bool]
+    ) -> tuple[Tape, FlightError | None]:
+        """Fly a block of periods and return the tape, and why it cannot go on, if it cannot."""
         control = self.assembly.scenario.rates.control
         end = min(first + self.periods - 1, last)
-        wanted = self.assembly.reference.at(np.arange(first, end + 1, dtype=float) * control)
+        times = np.arange(first, end + 1, dtype=float) * control
+        wanted = reference_at(self.assembly.reference, times)
         tape = Tape(first, wanted)
         due = clock.monotonic() + BLOCK_SECONDS
         now = first * control
@@ -127,24 +142,26 @@ class _Flight:
                     if stop() or clock.monotonic() > due:
                         break
         except (SimulationError, FlightError) as error:
-            return tape, f"stopped at t = {now:.6g} s: {error}"
+            trouble = FlightError(f"stopped at t = {now:.6g} s: {error}")
+            trouble.__cause__ = error.__cause__ or error
+            return tape, trouble
         raised = np.flatnonzero(self.batch.warning[:, :, 1].any(axis=0))
         if len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name
-            return tape, f"MuJoCo warned ({warning}) between t = {first * control:.6g} s and now"
-        return tape, ""
+            return tape, FlightError(
+                f"MuJoCo warned ({warning}) between t = {first * control:.6g} s and now"
+            )
+        return tape, None
 
     def _fly_period(
         self, tape: Tape, period: int, now: float, reference: Wanted, *, flown: bool
     ) -> None:
-        if masses := self.actuators.masses(self.actuator_state):
-            self._weigh(masses)
         physics = self.batch.state.copy()
         truth = self._truth(physics)
         tape.physics.append(physics)
         tape.sensors.append(self.sensors)
         tape.actuators.append(self.actuator_state)
-        self.sensors, measurement = self.suite.sample(self.sensors, period * self.steps, truth)
+        measurement = self._measure(period * self.steps, truth)
         before, command, signals = self._ask_law(now, measurement, reference)
         if self.faults is not None:
             topics = {"truth": truth, "measurement": measurement, "command": command}
@@ -156,7 +173,7 @@ class _Flight:
         if self.field is not None:
             self.acting_field[:] = self.field.piece(now)
         if self.push is not None:
-            tape.push.append(self.push(now, truth))
+            tape.push.append(self.push(now, physics, truth))
         if self.deployments is not None:
             tape.happened += self.deployments(now)
         # Derived fields lag the state by one substep: the first substep computes those of `now`.
@@ -174,6 +191,10 @@ class _Flight:
         if flown and self.steps > 1:
             self._rest_of_period(tape, period * self.steps, command)
 
+    def _measure(self, step: int, truth: Measurement) -> Measurement:
+        self.sensors, measurement = self.suite.sample(self.sensors, step, truth)
+        return read_only(measurement)
+
     def _ask_law(
         self, now: float, measurement: Measurement, reference: Wanted
     ) -> tuple[Any, Any, Any]:
@@ -181,12 +202,30 @@ class _Flight:
         law = self.assembly.law
         try:
             if self.law_state is None:
-                self.law_state = law.reset(measurement, reference)
+                state = law.reset(measurement, reference)
+                check_state(state)
+                self.law_state = read_only(state or ())
             before = self.law_state
-            self.law_state, command, signals = law.step(before, now, measurement, reference)
+            returned = law.step(before, now, measurement, reference)
+        except FlightError:
+            raise
         except Exception as error:
-            raise FlightError(f"the law raised {type(error).__name__}: {error}") from error
-        return before, command, signals
+            raise failure("the law", error) from error
+        self._check_returned(before, returned)
+        state, command, signals = returned
+        self.law_state = read_only(state or ())
+        return before, read_only(command), read_only(signals or ())
+
+    def _check_returned(self, before: Any, returned: Any) -> None:
+        """Refuse what the law's step must not return, on its first step or any later one."""
+        names = ("state", "command", "signals")
+        if self.returned is None:
+            check_step(returned)
+            for name, part in zip(names, returned, strict=True):
+                check_vehicle_axis(name, part, len(self.batch.state))
+            self.returned = (before, *returned[1:])
+        for name, part, first in zip(names, returned, self.returned, strict=True):
+            check_same_shapes(name, part, first)
 
     def _drive(
         self, now: float, command: Any, measurement: Measurement, truth: Measurement
@@ -196,26 +235,33 @@ class _Flight:
             try:
                 self.law_state, command = self.inner(self.law_state, now, command, measurement)
             except Exception as error:
-                raise FlightError(
-                    f"the law's inner loop raised {type(error).__name__}: {error}"
-                ) from error
+                raise failure("the law's inner loop", error) from error
+            read_only(self.law_state)
+        before = self.actuator_state
         self.actuator_state, given, saturated = self.actuators.act(
-            self.actuator_state, command, truth, self.hold
+            before, command, truth, self.hold
         )
         if self.faults is not None:
             self.actuator_state, given = self.faults.change(self.actuator_state, given, now)
         for view, torque in zip(self.applied, given, strict=True):
             view[:] = torque
+        self._weigh(self.actuators.masses(before, self.actuator_state))
         return given, saturated
 
     def _weigh(self, masses: list[tuple[str, int, Array]]) -> None:
-        """Give bodies the mass that they have by now, and keep it for the period."""
-        for name, body, values in masses:
-            self.batch.expand(name)[:, body] = values
-        self.batch.set_const()
+        """Give bodies the masses of the middle of the integration step.
+
+        The constants that MuJoCo derives from them take 0.6 of a step's time: they are derived
+        again only where something burns.
+        """
+        fields = [(self.batch.expand(name)[:, body], values) for name, body, values in masses]
+        if any(not np.array_equal(field, values) for field, values in fields):
+            for field, values in fields:
+                field[:] = values
+            self.batch.set_const()
 
     def _truth(self, physics: Array) -> Measurement:
-        return self.actuators.seen(self.actuator_state, self.columns.truth(physics))
+        return read_only(self.actuators.seen(self.actuator_state, self.columns.truth(physics)))
 
     def _rest_of_period(self, tape: Tape, first_step: int, command: Any) -> None:
         """Integrate from the period's first substep to its end, with the samples due in between."""
@@ -228,11 +274,12 @@ class _Flight:
                 physics = self.batch.state.copy()
                 seen = truth = self._truth(physics) if looks else self.columns.motion(physics)
                 if looks:
-                    self.sensors, seen = self.suite.sample(self.sensors, first_step + step, truth)
+                    seen = self._measure(first_step + step, truth)
                 if self.push is not None:
-                    self.push(now, truth)
+                    self.push(now, physics, truth)
                 if self.driven_stepwise:
-                    self._drive(now, command, seen, truth)
+                    _, saturated = self._drive(now, command, seen, truth)
+                    tape.saturated[-1] = np.maximum(tape.saturated[-1], saturated)
                 if self.deployments is not None:
                     tape.happened += self.deployments(now)
             count = 1 if self.stepwise else self.tick - step % self.tick

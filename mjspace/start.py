@@ -35,7 +35,7 @@ class Start:
 
 def last_period(scenario: Scenario) -> int:
     """Return the number of the scenario's last control period."""
-    return math.floor(scenario.duration / scenario.rates.control * (1.0 + 1e-12))
+    return math.floor(scenario.duration / scenario.rates.control + 1e-6)
 
 
 def first_start(assembly: Assembly, members: Sequence[int]) -> Start:

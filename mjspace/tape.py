@@ -11,11 +11,12 @@ from mjspace import attitude
 from mjspace.assembly import Assembly
 from mjspace.columns import Columns
 from mjspace.contract import Array, Measurement, Wanted
-from mjspace.errors import FlightError
 
 Rows = dict[str, dict[str, Array]]
 Happening = tuple[float, int, str, str]
 """Time [s], vehicle, level (INFO or WARNING) and message of an event."""
+TICK = 1e-9
+"""s: what is closer than this is one instant."""
 
 
 @dataclass(frozen=True)
@@ -132,11 +133,14 @@ class Tape:
             "/law": _fields(self.signals[:n]),
             "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
         }
-        time = (self.period + np.arange(n, dtype=float)) * assembly.scenario.rates.control
+        control = assembly.scenario.rates.control
+        time = (self.period + np.arange(n, dtype=float)) * control
         events = _saturation_events(
             time, np.array(self.saturated[:n], bool), saturated_before, vehicle.motors
         )
-        events += [event for event in self.happened if event[0] <= time[-1]]
+        # Also those within the last period; a period that could not be recorded has none.
+        end = time[-1] + control - TICK
+        events += [event for event in self.happened if event[0] < end]
         return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
 
 
@@ -155,23 +159,11 @@ def _about_the_place(
 
 
 def _fields(tuples: list[Any]) -> dict[str, Array]:
-    """Return the named tuples' fields as arrays with a period axis; without what is empty.
-
-    Raises:
-        FlightError: no named tuples of arrays, or arrays that change their shape.
-    """
+    """Return the named tuples' fields as arrays with a period axis; without what is empty."""
     if not tuples[0]:
         return {}
-    try:
-        names = tuples[0]._fields
-        columns = zip(*tuples, strict=True)
-        fields = {n: np.array(column, float) for n, column in zip(names, columns, strict=True)}
-    except (AttributeError, TypeError, ValueError) as error:
-        raise FlightError(
-            f"a law's state, command and signals are named tuples of arrays of constant shape; "
-            f"{type(tuples[0]).__name__} is not: {error}"
-        ) from error
-    return _without_empty(fields)
+    names, columns = tuples[0]._fields, zip(*tuples, strict=True)
+    return _without_empty({n: np.array(c, float) for n, c in zip(names, columns, strict=True)})
 
 
 def _without_empty(fields: dict[str, Array]) -> dict[str, Array]:

@@ -14,9 +14,12 @@ if TYPE_CHECKING:
     from mjspace.log_reader import Log
 
 
-def finish(result: "Result", plot_it: bool, video: bool, as_json: bool) -> None:
+def finish(result: "Result", plot_it: bool, video: bool, as_json: bool, traceback: bool) -> None:
     """Print the verdict, make the pictures that were asked for, and exit with the status."""
     from mjspace import report
+
+    if traceback and result.error is not None:
+        _print_cause(result.error)
 
     pictures = {}
     if not as_json:
@@ -65,6 +68,23 @@ def progress_bar(
         total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout
     ) as bar:
         yield lambda reached: bar.update(reached - bar.n) and None
+
+
+@contextmanager
+def in_full(traceback: bool) -> Iterator[None]:
+    """Print what caused an error, with its traceback, before the error goes on."""
+    try:
+        yield
+    except Exception as error:
+        if traceback:
+            _print_cause(error)
+        raise
+
+
+def _print_cause(error: Exception) -> None:
+    from traceback import print_exception
+
+    print_exception(error.__cause__ or error)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numba import guvectorize
 
-from mjspace.actuators import State
+from mjspace.actuators import Fields, State
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
 from mjspace.engine import DRY
@@ -59,9 +59,9 @@ class Thrusters:
         return cls(data, len(table.positions), memory, tank, full, table.propellant or 0.0)
 
     @property
-    def takes(self) -> str:
-        """What a command must have."""
-        return f"on_time of shape (..., {self.count}) [s]"
+    def takes(self) -> Fields:
+        """The fields of a command."""
+        return {"on_time": (self.count, "s")}
 
     def reset(self, vehicles: int) -> State:
         """Return closed valves and a full tank.
@@ -116,11 +116,15 @@ class Thrusters:
             state = state | {"rcs_propellant": np.maximum(left - burnt, 0.0)}
         return state, instead
 
-    def masses(self, state: State) -> dict[str, tuple[int, Array]]:
-        """Return, of MuJoCo's model, the body and the values of each field that burning changes."""
+    def masses(self, before: State, after: State) -> dict[str, tuple[int, Array]]:
+        """Return, of MuJoCo's model, the body and the values of each field that burning changes.
+
+        They are those in the middle of the integration step that leads from ``before`` to
+        ``after``: with them a constant thrust gives Tsiolkovsky's velocity to second order.
+        """
         if not self.tank:
             return {}
-        left = np.maximum(state["rcs_propellant"], DRY)
+        left = np.maximum(0.5 * (before["rcs_propellant"] + after["rcs_propellant"]), DRY)
         return {
             "body_mass": (self.tank, left[:, 0]),
             "body_inertia": (self.tank, left * self.full),

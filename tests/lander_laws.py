@@ -12,7 +12,7 @@ PRINTED = VariableStructure(
     equilibrium_thrust=0.0,
     surface_gain=np.array([1.0, 14.0, 2.0]),
     thrust_range=np.array([0.0, np.inf]),
-    gimbal_limit=np.inf,
+    gimbal_limit=np.pi,
 )
 LEAST_CORRECTED = replace(  # O1P: M1, M2, M3
     PRINTED,

@@ -1,11 +1,15 @@
 """Small logs with every kind of content, for the tests of the log."""
 
+from collections import Counter
+from collections.abc import Callable
 from math import prod
 from pathlib import Path
 
 import numpy as np
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 
 from mjspace.contract import Array
 from mjspace.log_layout import Fields
@@ -69,3 +73,47 @@ def fly(path: Path) -> Path:
         for i, count in enumerate(BLOCKS):
             write_block(log, sum(BLOCKS[:i]), count)
     return path
+
+
+def rewritten(
+    path: Path,
+    out: Path,
+    change: Callable[[str, int, bytes], bytes] = lambda topic, number, data: data,
+    *,
+    digests: bool = True,
+) -> Path:
+    """Write the log at ``path`` anew with mcap's own writer, as another tool would; return ``out``.
+
+    ``change`` gives each message's content, by its topic and its number on it.
+    """
+    numbers: Counter[str] = Counter()
+    with path.open("rb") as source, out.open("wb") as target:
+        reader, writer = make_reader(source), Writer(target, compression=CompressionType.ZSTD)
+        summary = reader.get_summary()
+        assert summary is not None
+        writer.start()
+        schemas = {
+            s.id: writer.register_schema(s.name, s.encoding, s.data)
+            for s in summary.schemas.values()
+        }
+        channels = {
+            c.id: writer.register_channel(
+                c.topic, c.message_encoding, schemas[c.schema_id], c.metadata
+            )
+            for c in summary.channels.values()
+        }
+        for note in reader.iter_metadata():
+            if digests or note.name == "mjspace":
+                writer.add_metadata(note.name, note.metadata)
+        for kept in reader.iter_attachments():
+            writer.add_attachment(
+                kept.create_time, kept.log_time, kept.name, kept.media_type, kept.data
+            )
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            data = change(channel.topic, numbers[channel.topic], message.data)
+            numbers[channel.topic] += 1
+            writer.add_message(
+                channels[channel.id], message.log_time, data, message.publish_time, message.sequence
+            )
+        writer.finish()
+    return out

@@ -79,11 +79,11 @@ def test_propellant_goes_with_thrust_over_exhaust_speed() -> None:
     used = np.sum(acted[:, 2]) * STEP / (320.0 * STANDARD_GRAVITY)
     assert 20.0 - state["propellant"][0, 0] == pytest.approx(used, rel=1e-10)
 
-    body, left = flown.masses(state)["body_mass"]
+    body, left = flown.masses(state, state)["body_mass"]
     assert Vehicle.model.body(body).name == "tank"
     assert left == state["propellant"][0]
     # the tank shrinks in mass, not in size
-    np.testing.assert_allclose(flown.masses(state)["body_inertia"][1], 0.036 * left[0])
+    np.testing.assert_allclose(flown.masses(state, state)["body_inertia"][1], 0.036 * left[0])
 
 
 def test_an_empty_tank_ends_it() -> None:
@@ -94,11 +94,11 @@ def test_an_empty_tank_ends_it() -> None:
         0.01 * 320.0 * 9.80665 / 320.0 / STEP, abs=1
     )
     assert state["propellant"][0, 0] == 0.0
-    assert flown.masses(state)["body_mass"][1] > 0.0  # a body without any mass would not fly
+    assert flown.masses(state, state)["body_mass"][1] > 0.0  # a body without any mass would not fly
 
 
 def test_what_burns_nothing_weighs_the_same() -> None:
-    assert engine().masses(engine().reset(1)) == {}
+    assert engine().masses(engine().reset(1), engine().reset(1)) == {}
 
 
 @pytest.mark.parametrize(

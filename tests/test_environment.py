@@ -15,6 +15,7 @@ from mjspace.constants import GM
 from mjspace.contract import Array
 from mjspace.environment_kernel import MAGIC
 from mjspace.environment_tables import DisturbanceTorque, Environment, Orbit, Sine
+from mjspace.hinge_tables import Friction
 
 CIRCULAR = Orbit(semi_major_axis=7.0e6)
 ELLIPTIC = Orbit(
@@ -70,7 +71,10 @@ def _installed() -> None:
 
 
 def compiled(
-    xml: str, outside: Environment, friction: Mapping[str, float] | None = None, step: float = 1.0
+    xml: str,
+    outside: Environment,
+    friction: Mapping[str, Friction] | None = None,
+    step: float = 1.0,
 ) -> tuple[Any, Any]:
     """Return the model of ``xml`` and its data, whose userdata asks for this environment."""
     spec = mujoco.MjSpec.from_string(xml)
@@ -337,7 +341,7 @@ def test_time_is_a_whole_number_of_half_steps() -> None:
 
 def test_coulomb_friction_stops_the_wheel_and_leaves_the_momentum() -> None:
     coefficient, start, rotor, bus = 0.002, 0.9, 0.05, 7.0
-    model, data = compiled(WHEEL, Environment(), {"wheel_0": coefficient}, step=0.002)
+    model, data = compiled(WHEEL, Environment(), {"wheel_0": Friction(coefficient)}, step=0.002)
     data.qvel[6] = start
     before = rotor * start
     for duration in (5.0, 10.0, 5.0):
@@ -393,7 +397,7 @@ def test_a_batch_of_different_environments_is_a_loop_of_single_vehicles() -> Non
         )
         return Environment(orbit=orbit if i % 2 else None, torques=[torque] * (i % 4))
 
-    friction = {"wheel_0": 0.003}
+    friction = {"wheel_0": Friction(0.003)}
     spec = mujoco.MjSpec.from_string(WHEEL)
     spec.nuserdata = max(environment.userdata_size(outside(i), friction) for i in range(8))
     model = spec.compile()
@@ -435,14 +439,14 @@ def _small(xml: str, userdata: int = 50) -> Callable[[], Any]:
     [
         (f"<mujoco>{OPTION}</mujoco>", 50, {}, "no free joint"),
         (BODY, 5, {}, "nuserdata is 5: 16 are needed"),
-        (WHEEL, 50, {"wheel_9": 0.1}, "no hinge 'wheel_9'"),
+        (WHEEL, 50, {"wheel_9": Friction(0.1)}, "no hinge 'wheel_9'"),
         (BODY.replace('dim="6"', 'dim="5"'), 50, {}, 'dim="6" needstage="vel"'),
         (BODY.replace("vel", "pos"), 50, {}, 'dim="6" needstage="vel"'),
         (BODY.replace("<flag ", '<flag spring="disable" damper="disable" '), 50, {}, "enable one"),
     ],
 )
 def test_models_that_will_not_do(
-    xml: str, userdata: int, friction: dict[str, float], message: str
+    xml: str, userdata: int, friction: dict[str, Friction], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
         environment.userdata(_small(xml, userdata), Environment(orbit=CIRCULAR), friction)

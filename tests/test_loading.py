@@ -73,7 +73,7 @@ def test_written_out_and_read_back_is_the_same(minimal: Path) -> None:
         ("rates.integrator=rk4", ["rates.integrator", "rk4", "RK4"]),
         ("plant.gyrostat_inertia=[[1,0,0],[0,1,0],[0,0,-1]]", ["not positive definite"]),
         ("plant.gyrostat_inertia=[[1,0.5,0],[0,1,0],[0,0,1]]", ["not symmetric"]),
-        ("initial.attitude=[0,0,0,0]", ["initial", "zero quaternion"]),
+        ("initial.attitude=[0,0,0,0]", ["initial.attitude", "norm is 0"]),
         ("duration=0", ["duration", "greater than 0"]),
         ("description", ["--set description", "key=value"]),
         ("duration.x=1", ["--set duration.x=1", "table"]),

@@ -113,9 +113,9 @@ def test_the_summary_agrees_with_the_data(flown: Path) -> None:
     with flown.open("rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
-        assert [(note.name, note.metadata) for note in reader.iter_metadata()] == [
-            ("mjspace", METADATA)
-        ]
+        ours, digests = reader.iter_metadata()
+        assert (ours.name, ours.metadata) == ("mjspace", METADATA)
+        assert (digests.name, list(digests.metadata)) == ("mjspace.sha256", list(TOPICS))
         assert {a.name: (a.media_type, a.data) for a in reader.iter_attachments()} == ATTACHMENTS
         assert summary is not None
         assert summary.statistics is not None

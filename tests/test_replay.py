@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from log_samples import rewritten
 
 from mjspace.assembly import assemble
 from mjspace.errors import InputError
 from mjspace.flight import Result, run
 from mjspace.flown import scenario_of
 from mjspace.loading import component
+from mjspace.log_layout import doubles
 from mjspace.log_reader import Log
 from mjspace.plant import UnphysicalInertiaWarning
 from mjspace.replay import replay, verify
@@ -97,11 +99,62 @@ def test_a_difference_is_named(
     monkeypatch.setattr(module, "assemble", altered)
     found = verify(noisy.path)
     assert found is not None
-    assert found.time == pytest.approx(0.301)
-    assert found.field == "physics"
-    assert found.logged != found.flown
-    assert "/state.physics" in str(found)
-    assert "t = 0.301 s" in str(found)
+    assert found.time == pytest.approx(0.3)
+    assert (found.topic, found.field) == ("/command", "torque")
+    assert found.flown == np.nextafter(found.logged, np.inf)
+    assert "/command.torque[0] differs first at t = 0.3 s" in str(found)
+
+
+def changed_log(log: Log, out: Path, topic: str, field: str, number: int, *, digests: bool) -> Path:
+    """Return the log written anew with the last bit of a field's first number changed in a row."""
+    layout = doubles(log.topics[topic])
+
+    def change(at: str, k: int, data: bytes) -> bytes:
+        if (at, k) != (topic, number):
+            return data
+        row = np.frombuffer(bytearray(data), layout.dtype)
+        bits = row[field].reshape(1, -1).copy().view(np.uint64)
+        bits[0, 0] ^= np.uint64(1)
+        row[field] = bits.view(np.float64).reshape(row[field].shape)
+        return row.tobytes()
+
+    return rewritten(log.path, out, change, digests=digests)
+
+
+EVERYTHING = (
+    "duration=0.05",
+    "sensors.rate.noise=0.01",
+    "sensors.rate.bias_walk=0.01",
+    "faults=[{motor='wheel_0', kind='delayed', value='2 ms', at=0.01}]",
+)
+"""A flight of which /state holds the memory of law, sensors, actuators and faults."""
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    with pytest.warns(UnphysicalInertiaWarning):
+        result = run(
+            "contraction-adaptive", overrides=EVERYTHING, out=tmp_path_factory.mktemp("all")
+        )
+    kinds = {field.partition("_")[0] for field in result.log.topics["/state"]}
+    assert kinds == {"physics", "law", "sensor", "actuator"}
+    return result
+
+
+@pytest.mark.parametrize("topic", ["/state", "/truth", "/measurement", "/command", "/law"])
+def test_one_bit_of_any_field_is_named(everything: Result, tmp_path: Path, topic: str) -> None:
+    """The digests name the topic; without them, the flight again names field and time."""
+    log = everything.log
+    for field in log.topics[topic]:
+        path = changed_log(log, tmp_path / "one.mcap", topic, field, 30, digests=False)
+        found = verify(path)
+        assert found is not None, field
+        assert (found.topic, found.field, found.index) == (topic, field, 0)
+        assert found.time == pytest.approx(0.03, abs=1e-9)
+        assert f"{topic}.{field}[0] differs first at t = 0.03 s" in str(found)
+    path = changed_log(log, tmp_path / "one.mcap", topic, field, 30, digests=True)
+    with pytest.raises(InputError, match=f"log: {topic} changed since the flight"):
+        verify(path)
 
 
 def test_another_law_from_the_middle(noisy: Result, tmp_path: Path) -> None:

@@ -339,14 +339,17 @@ def test_any_number_of_wheels_is_read(wheels: int) -> None:
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
-        ({"rate": {"period": 2.5e-3}}, r"sensors\.rate\.period 0\.0025 s .* 0\.001 s: 0\.002 s"),
+        (
+            {"rate": {"period": 2.5e-3}},
+            r"sensors\.rate\.period: 0\.0025 s .* 0\.002 s and 0\.003 s",
+        ),
         (
             {"rate": {"period": 2e-3, "delay": 5e-3}},
-            r"sensors\.rate\.delay 0\.005 s .* sensors\.rate\.period 0\.002 s: 0\.004 s",
+            r"sensors\.rate\.delay: 0\.005 s .* sensors\.rate\.period, 0\.002 s: .* 0\.004 s and",
         ),
         (
             {"attitude": {"delay": 4e-4}},
-            r"sensors\.attitude\.delay .* rates\.control 0\.001 s: 0\.001 s",
+            r"sensors\.attitude\.delay: .* rates\.control, 0\.001 s: .* 0\.001 s",
         ),
         ({"attitude": {"quantization": 1.5}}, r"attitude\.quantization 1\.5 rad"),
     ],

@@ -155,10 +155,6 @@ class Law:
             return None, Signals(time), Signals(time)
         if self.trouble == "two":
             return None, Command(np.zeros(2)), Signals(time)
-        if self.trouble == "plain":
-            return None, Command(torque), [time]
-        if self.trouble == "shape":
-            return None, Command(torque), Signals(np.zeros(1 + int(time > 0.0055)))
         if time > 0.0105 and self.trouble == "huge":
             torque[0] = 1e300
         return None, Command(torque), Signals(time)
@@ -175,7 +171,7 @@ def law(tmp_path: Path) -> Path:
     ("trouble", "message"),
     [
         ("nan", r"/command\.torque is not finite, or beyond 1e10, at t = 0\.011 s"),
-        ("raise", r"t = 0\.011 s: the law raised ZeroDivisionError"),
+        ("raise", r"t = 0\.011 s: the law raised ZeroDivisionError at law\.py:\d+: division"),
         ("huge", r"/command\.torque is not finite, or beyond 1e10, at t = 0\.011 s"),
     ],
 )
@@ -192,8 +188,8 @@ def test_trouble_ends_the_flight_and_keeps_every_good_period(
     kept: list[Block] = []
     with pytest.raises(FlightError, match=message):
         kept.extend(fly(built, first_start(built, (0,))))
-    assert [len(block.time) for block in kept] == [11]  # 0 to 10 ms
-    for fields in kept[0].rows.values():
+    assert sum(len(block.time) for block in kept) == 11  # 0 to 10 ms
+    for fields in (fields for block in kept for fields in block.rows.values()):
         for values in fields.values():
             assert np.isfinite(values).all()
 
@@ -204,8 +200,6 @@ def test_trouble_ends_the_flight_and_keeps_every_good_period(
         ("at once", "t = 0 s: the law raised ZeroDivisionError"),
         ("no torque", "t = 0 s: the law's command has no torque"),
         ("two", "t = 0 s: the law's command has no torque of shape"),
-        ("plain", "named tuples of arrays of constant shape; list is not"),
-        ("shape", "named tuples of arrays of constant shape; Signals is not"),
     ],
 )
 def test_a_law_that_cannot_be_flown_is_told_so(law: Path, trouble: str, message: str) -> None:
@@ -225,8 +219,8 @@ def test_stop_is_obeyed_at_once() -> None:
 
     built = assembly("contraction-ideal")
     blocks = list(fly(built, first_start(built, (0,)), stop=stop))
-    assert len(blocks) == 1
-    assert 15 <= len(blocks[0].time) <= 21
+    # Asked once more after each block, of which a slow machine makes more.
+    assert sum(len(block.time) for block in blocks) == 22 - len(blocks)
 
 
 def test_a_disturbance_of_ones_own_acts_and_is_logged(tmp_path: Path) -> None:
@@ -291,3 +285,36 @@ def test_against_an_independent_integration_of_the_sampled_loop(name: str) -> No
     )
     apart = rotation_angle(rows(blocks, "/truth", "attitude"), other.attitude)
     assert apart.max() < CASES[name]
+
+
+BETWEEN = ("rates.control=0.01", "plant.parts.east.deployment.at=0.1034", "duration=0.9")
+"""The weights are released, and let go, between two control instants."""
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("contraction-adaptive", ("duration=0.6", "plant.wheels.torque_limit=5")),
+        ("detumble-wheels", ("duration=1", "faults=[{motor='wheel_0', kind='dead', at=0.5}]")),
+        ("yo-yo-despin", BETWEEN),
+    ],
+)
+def test_rows_and_events_do_not_depend_on_the_blocks(
+    name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mjspace.simulation.BLOCK_SECONDS", np.inf)
+    built = assembly(name, *overrides)
+    found = {}
+    for periods in (500, 7, 1):
+        monkeypatch.setattr("mjspace.simulation.BLOCK_PERIODS", periods)
+        blocks = flown(built)
+        assert max(len(block.time) for block in blocks) <= periods
+        whole = {
+            (topic, field): rows(blocks, topic, field).tobytes()
+            for topic, fields in blocks[0].rows.items()
+            for field in fields
+        }
+        found[periods] = whole, [event for block in blocks for event in block.events]
+    assert found[500][1]
+    assert found[7] == found[500]
+    assert found[1] == found[500]

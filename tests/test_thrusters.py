@@ -94,9 +94,9 @@ def test_propellant_goes_with_impulse_over_exhaust_speed() -> None:
     state, impulse, _ = fire(flown, [0.0125, 0.02, 0.003], 20)
     used = 0.5 - state["rcs_propellant"][0, 0]
     assert used == pytest.approx(impulse.sum() / (220.0 * STANDARD_GRAVITY), rel=1e-9)
-    assert flown.masses(state)["body_mass"][1] == state["rcs_propellant"][0]
+    assert flown.masses(state, state)["body_mass"][1] == state["rcs_propellant"][0]
     np.testing.assert_allclose(
-        flown.masses(state)["body_inertia"][1], 0.02 * state["rcs_propellant"] * np.ones(3)
+        flown.masses(state, state)["body_inertia"][1], 0.02 * state["rcs_propellant"] * np.ones(3)
     )
     assert flown.seen(state, TRUTH).propellant == state["rcs_propellant"]
 
@@ -112,7 +112,7 @@ def test_an_empty_tank_ends_it_with_its_last_gram() -> None:
 
 def test_what_burns_nothing_weighs_the_same() -> None:
     flown = thrusters()
-    assert flown.masses(flown.reset(1)) == {}
+    assert flown.masses(flown.reset(1), flown.reset(1)) == {}
     assert flown.seen(flown.reset(1), TRUTH).propellant.size == 0
 
 

@@ -90,4 +90,7 @@ def test_a_lander_may_have_them_beside_its_engine() -> None:
     model = built.vehicle.model
     assert mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "rcs_tank") < 0
     state = built.actuators.reset(1)
-    assert [name for name, *_ in built.actuators.masses(state)] == ["body_mass", "body_inertia"]
+    assert [name for name, *_ in built.actuators.masses(state, state)] == [
+        "body_mass",
+        "body_inertia",
+    ]

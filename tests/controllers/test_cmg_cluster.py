@@ -201,10 +201,10 @@ def test_its_torque_carries_the_wheels_round() -> None:
 @pytest.mark.parametrize(
     ("gains", "message"),
     [
-        ({"momentum": 0.0}, "momentum is 0: more than zero"),
-        ({"damping": -1.0}, "damping is -1: zero or more"),
-        ({"dither": 0.5}, "dither is 0.5: less than 0.5"),
-        ({"spin_axes": SPINS[:3]}, "4 gimbal_axes, 3 spin_axes and 4 of wheel_inertia"),
+        ({"momentum": 0.0}, "momentum: got 0 .* greater than 0"),
+        ({"damping": -1.0}, "damping: got -1.* 0 or more"),
+        ({"dither": 0.5}, "dither: got 0.5.* less than 0.5"),
+        ({"spin_axes": SPINS[:3]}, "spin_axes: 3 rows for 4 of gimbal_axes"),
     ],
 )
 def test_gains_that_cannot_work_are_refused(gains: dict[str, Any], message: str) -> None:

@@ -99,7 +99,7 @@ def test_cubic_starts_as_table_3_and_ends_upright() -> None:
 
 
 def test_bezier_starts_as_table_3_upright_and_ends_descending() -> None:
-    wanted = BezierDescent(stance=0.0, azimuth=0.0).at(np.array([0.0, 79.275, 89.275]))
+    wanted = BezierDescent(stance=0.0, azimuth=0.0).at(np.array([0.0, 79.346, 89.346]))
     np.testing.assert_allclose(wanted.position[0], [2500.0, 0.0, 1000.0])
     np.testing.assert_allclose(wanted.velocity[0], [-24.0, -7.0, -10.0], atol=2e-4)
     np.testing.assert_allclose(wanted.position[1:], [[0.0, 0.0, 2.0], [0.0, 0.0, -3.0]], atol=2e-3)
@@ -113,8 +113,8 @@ def test_bezier_starts_as_table_3_upright_and_ends_descending() -> None:
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: SineDescent(duration=0.0), "duration is 0 s"),
-        (lambda: BezierDescent(duration=-1.0), "duration is -1 s"),
+        (lambda: SineDescent(duration=0.0), "duration: got 0 s"),
+        (lambda: BezierDescent(duration=-1.0), "duration: got -1 s"),
         (lambda: BezierDescent(points=np.zeros((4, 3))), "4 rows: 5 or more"),
     ],
 )

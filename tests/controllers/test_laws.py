@@ -200,12 +200,12 @@ def test_no_law_needs_the_physics_engine() -> None:
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: Ideal(H, AXES, JW, rate_gain=0.0), "rate_gain is 0: more than zero"),
-        (lambda: Ideal(H, AXES, JW, torque_limit=-1.0), "torque_limit is -1"),
-        (lambda: Gradient(0.0), "control_period is 0"),
-        (lambda: Adaptive(PERIOD, forgetting=-0.1), "forgetting is -0.1 1/s"),
+        (lambda: Ideal(H, AXES, JW, rate_gain=0.0), "rate_gain: got 0 .* greater than 0"),
+        (lambda: Ideal(H, AXES, JW, torque_limit=-1.0), "torque_limit: got -1"),
+        (lambda: Gradient(0.0), "control_period: got 0"),
+        (lambda: Adaptive(PERIOD, forgetting=-0.1), "forgetting: got -0.1 1/s"),
         (lambda: Adaptive(0.5, filter_bandwidth=3.0), "3 rad/s, control_period 0.5 s: less than 2"),
-        (lambda: ImmersionInvariance(H, AXES, JW, target_gain=-1.0), "target_gain is -1 1/s"),
+        (lambda: ImmersionInvariance(H, AXES, JW, target_gain=-1.0), "target_gain: got -1 1/s"),
     ],
 )
 def test_gains_that_cannot_work_are_refused(build: Any, message: str) -> None:

@@ -255,9 +255,9 @@ def test_held_for_a_period_the_torque_errs_in_proportion() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"rate_weight": np.array([1.0, -1.0, 1.0])}, "rate_weight is .*zero or more"),
-        ({"angle_weight": np.zeros(3)}, "angle_weight is .*more than zero"),
-        ({"torque_weight": np.zeros(3)}, "torque_weight is .*more than zero"),  # erratum 2
+        ({"rate_weight": np.array([1.0, -1.0, 1.0])}, "rate_weight.* 0 or more"),
+        ({"angle_weight": np.zeros(3)}, "angle_weight.* greater than 0"),
+        ({"torque_weight": np.zeros(3)}, "torque_weight.* greater than 0"),  # erratum 2
     ],
 )
 def test_weights_without_a_solution_are_refused(change: Any, message: str) -> None:

@@ -198,11 +198,11 @@ def test_the_wheels_give_their_gyroscopic_torque_too() -> None:
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: law(Fixed, attitude_gain=0.0), "attitude_gain is 0: any other number"),
-        (lambda: law(Switched, attitude_gain=-1.0), "attitude_gain is -1: more than zero"),
-        (lambda: law(Switched, hysteresis=1.0), "hysteresis is 1"),
-        (lambda: law(RateDamping, rate_gain=0.0), "rate_gain is 0: more than zero"),
-        (lambda: Fixed(0.0, AXES, JW), "control_period is 0"),
+        (lambda: law(Fixed, attitude_gain=0.0), "attitude_gain: got 0, should be any other"),
+        (lambda: law(Switched, attitude_gain=-1.0), "attitude_gain: got -1 .* greater than 0"),
+        (lambda: law(Switched, hysteresis=1.0), "hysteresis: got 1"),
+        (lambda: law(RateDamping, rate_gain=0.0), "rate_gain: got 0 .* greater than 0"),
+        (lambda: Fixed(0.0, AXES, JW), "control_period: got 0"),
     ],
 )
 def test_gains_that_cannot_work_are_refused(build: Any, message: str) -> None:

@@ -1,5 +1,6 @@
 """Wanted motions: their parts agree with each other, and pass through the places they should."""
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -24,14 +25,20 @@ IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 K = np.ones(3) / np.sqrt(3.0)
 
 
-def tabulated(times: np.ndarray, signs: np.ndarray | None = None) -> Table:
+def tabulated(times: np.ndarray, signs: np.ndarray | None = None, ends: Any = "rest") -> Table:
     attitude = MultiAxis().at(times).attitude
-    return Table(times, attitude if signs is None else attitude * signs[:, None])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it moves at its end
+        return Table(times, attitude if signs is None else attitude * signs[:, None], ends)
 
 
 number = st.floats(-1.0, 1.0)
 vector = arrays(float, 3, elements=number).filter(lambda v: np.linalg.norm(v) > 0.1)
-quaternion = arrays(float, 4, elements=number).filter(lambda q: np.linalg.norm(q) > 0.1)
+quaternion = (
+    arrays(float, 4, elements=number)
+    .filter(lambda q: np.linalg.norm(q) > 0.1)
+    .map(lambda q: q / np.linalg.norm(q))
+)
 time = st.floats(0.5, 4.0)
 angles = arrays(float, 3, elements=st.floats(0.1, 0.7))
 SOURCES = st.one_of(
@@ -43,6 +50,7 @@ SOURCES = st.one_of(
     st.builds(MultiAxis, angles, angles),
     st.builds(EulerSinusoids, angles.map(lambda a: 2.0 * a), angles.map(lambda w: 2.0 * w)),
     st.just(tabulated(np.linspace(0.0, 3.0, 31))),
+    st.just(tabulated(np.linspace(0.0, 3.0, 31), ends="continue")),
 )
 
 
@@ -114,7 +122,7 @@ def test_regulation_peaks_as_reconstructed() -> None:
 def test_slew_goes_the_shorter_way_from_rest_to_rest() -> None:
     start = att.from_euler_zyx(np.array([0.3, -0.2, 3.0]))
     end = att.from_euler_zyx(np.array([0.1, 0.4, -3.0]))  # across the seam of yaw
-    wanted = Slew(-2.0 * end, 10.0, 5.0, start).at(np.linspace(0.0, 20.0, 2001))
+    wanted = Slew(-end, 10.0, 5.0, start).at(np.linspace(0.0, 20.0, 2001))
     for row, place in ((0, start), (500, start), (1500, end), (2000, end)):
         assert att.rotation_angle(wanted.attitude[row], place) < 1e-14  # rounding
         assert not wanted.rate[row].any()
@@ -140,7 +148,7 @@ def test_euler_sinusoids_are_sinusoids_in_euler_angles() -> None:
 def test_table_passes_its_points_and_holds_its_ends() -> None:
     times = np.array([1.0, 1.5, 2.5, 3.0, 4.5])
     given_ = MultiAxis().at(times).attitude
-    table = Table(times, 3.0 * given_ * np.array([1, -1, -1, 1, -1])[:, None])
+    table = tabulated(times, np.array([1.0, -1.0, -1.0, 1.0, -1.0]))
     np.testing.assert_allclose(table.at(times).attitude, given_, atol=1e-15)
     ends = table.at(np.array([-10.0, 1.0, 4.5, 100.0]))
     np.testing.assert_allclose(ends.attitude, given_[[0, 0, -1, -1]], atol=1e-15)
@@ -163,19 +171,45 @@ def test_table_converges_at_fourth_order() -> None:
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: Hold(np.zeros(4)), "attitude .* no direction"),
-        (lambda: Slew(IDENTITY, 0.0), "duration is 0 s"),
-        (lambda: Slew(IDENTITY, 1.0, 0.0, np.zeros(4)), "start_attitude .* no direction"),
-        (lambda: Sweep(ramp=3.0, cruise_end=2.0), "cruise_end 2 s .* 3 s or more"),
-        (lambda: Sweep(axis=np.full(3, np.nan)), "axis .* no direction"),
-        (lambda: Regulation(duration=-1.0), "duration is -1 s"),
+        (lambda: Hold(np.zeros(4)), "attitude: .* norm is 0"),
+        (lambda: Slew(IDENTITY, 0.0), "duration: got 0 s"),
+        (lambda: Slew(IDENTITY, 1.0, 0.0, np.zeros(4)), "start_attitude: .* norm is 0"),
+        (lambda: Sweep(ramp=3.0, cruise_end=2.0), "cruise_end: got 2 s,.* 3 s"),
+        (lambda: Sweep(axis=np.full(3, np.nan)), "axis.* finite"),
+        (lambda: Regulation(duration=-1.0), "duration: got -1 s"),
         (lambda: MultiAxis(np.array([0.0, 0.8, 0.0])), "pitch reach 91.7 deg"),
         (lambda: EulerSinusoids(np.array([0.0, 1.6, 0.0])), "pitch reach 91.7 deg"),
-        (lambda: Table(np.array([0.0, 1.0]), IDENTITY[None]), "2 times for 1 attitudes"),
-        (lambda: tabulated(np.array([0.0, 2.0, 1.0])), r"time\[2\] 1 s is not after time\[1\] 2 s"),
-        (lambda: Table(np.array([0.0, 1.0]), np.zeros((2, 4))), r"attitude\[0\] has no direction"),
+        (lambda: Table(np.array([0.0, 1.0]), IDENTITY[None]), "attitude: 1 rows for 2 of time"),
+        (lambda: tabulated(np.array([0.0, 2.0, 1.0])), r"time: \[2\] 1 is not after \[1\] 2"),
+        (lambda: Table(np.array([0.0, 1.0]), np.zeros((2, 4))), r"attitude: .* norm is 0"),
     ],
 )
 def test_what_cannot_be_flown_is_refused(build: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         build()
+
+
+def test_a_table_that_moves_at_its_end_says_so_and_can_go_on() -> None:
+    times = np.linspace(0.0, 4.0, 81)
+    turning = Turning(np.array([0.0, 0.0, 0.2])).at(times).attitude
+    with pytest.warns(UserWarning, match=r"turn at 0.2 rad/s at [04] s, where the reference rests"):
+        resting = Table(times, turning)
+    late = np.array([4.0, 7.0])
+    assert np.abs(resting.at(late).rate).max() < 1e-15
+    goes_on = Table(times, turning, "continue").at(np.array([-2.0, *late]))
+    wanted = Turning(np.array([0.0, 0.0, 0.2])).at(np.array([-2.0, *late]))
+    # Not-a-knot on steps of 10 mrad: 1.2e-8 rad/s at the ends, carried on for 3 s.
+    np.testing.assert_allclose(goes_on.rate, wanted.rate, atol=1e-7)
+    np.testing.assert_allclose(goes_on.attitude, wanted.attitude, atol=1e-7)
+
+
+def test_a_table_from_rest_to_rest_does_not_warn() -> None:
+    times = np.linspace(0.0, 10.0, 21)
+    Table(times, Slew(att.from_euler_zyx(np.array([0.3, -0.2, 2.0])), 10.0).at(times).attitude)
+
+
+def test_a_table_can_refuse_what_is_beyond_its_ends() -> None:
+    table = tabulated(np.linspace(0.0, 3.0, 31), ends="refuse")
+    table.at(np.array([0.0, 3.0]))
+    with pytest.raises(ValueError, match=r"the table has 0 to 3 s, without 3.1 s: add rows"):
+        table.at(np.array([2.9, 3.1]))

@@ -1,0 +1,25 @@
+"""Bezier curves: a motion through control points in a given time."""
+
+from math import comb
+
+import numpy as np
+
+from mjspace.contract import Array
+
+
+def curve(points: Array, duration: float, s: Array) -> list[Array]:
+    """Return a Bezier curve and its first four derivatives by time at ``s``, 0 to 1: (n, 3) each.
+
+    ``points`` (k, 3) [m] are passed in ``duration`` [s].
+    """
+    found, corners = [], points
+    for _ in range(5):
+        found.append(np.einsum("nk,kd->nd", bernstein(len(corners) - 1, s), corners))
+        corners = np.diff(corners, axis=0) * ((len(corners) - 1) / duration)
+    return found
+
+
+def bernstein(degree: int, s: Array) -> Array:
+    """Return Bernstein's polynomials at ``s`` (n,), shape (n, degree + 1)."""
+    terms = [comb(degree, k) * s**k * (1.0 - s) ** (degree - k) for k in range(degree + 1)]
+    return np.stack(terms, axis=-1)

@@ -1,0 +1,58 @@
+"""Gains that come from a CSV file: columns of numbers under a header of parameter names."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def columns(path: Path) -> dict[str, Any]:
+    """Return a CSV file's columns by their header; ``q0, q1, ...`` become one array ``q``.
+
+    Empty lines and what follows a ``#`` are passed over, but for the header.
+
+    Raises:
+        ValueError: no such file, no header, rows of unequal length, or something that is no number,
+            with the file and the line.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"file: {path} cannot be read: {error}") from None
+    names = [name.strip() for name in lines[0].lstrip("# ").split(",")] if lines else []
+    if not names or not all(name.isidentifier() for name in names):
+        raise ValueError(
+            f"file: {path}, line 1: got {', '.join(names)!r}, should be a header of the gains' "
+            "names, as in time,attitude0,attitude1,attitude2,attitude3"
+        )
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        cells = [cell.strip() for cell in line.partition("#")[0].split(",")]
+        if cells == [""]:
+            continue
+        if len(cells) != len(names):
+            raise ValueError(
+                f"file: {path}, line {number}: got {len(cells)} values, the header has {len(names)}"
+            )
+        rows.append([_number(cell, path, number) for cell in cells])
+    if not rows:
+        raise ValueError(f"file: {path}: no row of numbers below the header")
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(name.rstrip("0123456789"), []).append(name)
+    for base, parts in groups.items():
+        right = [base] if parts == [base] else [f"{base}{i}" for i in range(len(parts))]
+        if parts != right:
+            raise ValueError(f"file: {path}, line 1: got {parts}, should be {right}")
+    table = dict(zip(names, np.array(rows).T.tolist(), strict=True))
+    return {
+        base: table[base] if parts == [base] else np.array([table[p] for p in parts]).T.tolist()
+        for base, parts in groups.items()
+    }
+
+
+def _number(cell: str, path: Path, line: int) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        raise ValueError(f"file: {path}, line {line}: got {cell!r}, should be a number") from None

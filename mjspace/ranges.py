@@ -1,0 +1,176 @@
+"""Which numbers a declared parameter admits: a range for each of them, a form for the whole."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Array = NDArray[np.float64]
+Form = Literal["", "inertia", "direction", "unit vector", "quaternion", "increasing"]
+
+ROUNDED = 1e-3
+"""By how much the norm of a unit vector or a quaternion may differ from 1: three decimals."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """An interval, open at infinity: ``at_most=inf`` admits infinity, which then is no limit."""
+
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+    whole: bool = False
+    """Whether only whole numbers are admitted."""
+
+    def admits(self, value: _Array) -> NDArray[np.bool_]:
+        """Return whether each number is inside."""
+        inside = np.isfinite(value)
+        for limit in (self.at_least, self.at_most):
+            if limit is not None and np.isinf(limit):
+                inside |= value == limit
+        if self.above is not None:
+            inside &= value > self.above
+        if self.at_least is not None:
+            inside &= value >= self.at_least
+        if self.below is not None:
+            inside &= value < self.below
+        if self.at_most is not None:
+            inside &= value <= self.at_most
+        return inside & (value == np.rint(value)) if self.whole else inside
+
+    def demand(self, value: float) -> str:
+        """Return in words what ``value``, which is outside, should be."""
+        words = {"greater than {:.6g}": self.above, "{:.6g} or more": self.at_least}
+        words |= {"less than {:.6g}": self.below, "{:.6g} or less": self.at_most}
+        ends = [w.format(v) for w, v in words.items() if v is not None and np.isfinite(v)]
+        ends = ["a whole number"] * self.whole + ends
+        if not np.isfinite(value):
+            return "should be a number" if np.isnan(value) else "should be finite"
+        return "should be " + " and ".join(ends)
+
+    def __str__(self) -> str:
+        """Return the range as a person reads it, ``>= 0, < 1``; empty where it has no end."""
+        ends = {">": self.above, ">=": self.at_least, "<": self.below, "<=": self.at_most}
+        words = [f"{s} {v:.4g}" for s, v in ends.items() if v is not None and np.isfinite(v)]
+        infinite = [
+            f"or {v}" for v in (self.at_least, self.at_most) if v is not None and np.isinf(v)
+        ]
+        return " ".join([", ".join(["whole"] * self.whole + words), *infinite]).strip()
+
+
+def numbers(value: Any) -> _Array:
+    """Return ``value``, a number, an array or nested lists, as an array of float64.
+
+    Raises:
+        ValueError: something in it is no number (truth values and text are none), or the rows of a
+            list differ in length.
+    """
+    wrong = _not_a_number(value)
+    if wrong is not None:
+        raise ValueError(f"got {wrong!r}, should be a number")
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"got {value!r}, whose rows differ in length") from None
+
+
+def _not_a_number(value: Any) -> Any:
+    """Return the first thing in nested lists that is no number; None if all are."""
+    if isinstance(value, list | tuple):
+        return next((w for item in value if (w := _not_a_number(item)) is not None), None)
+    array = np.asarray(value)
+    return None if array.dtype.kind in "iuf" else (value if value is not None else "nothing")
+
+
+def refuse_unfit(gains: Mapping[str, Any], declared: Mapping[str, Mapping[str, Any]]) -> None:
+    """Refuse ``gains`` that do not fit what is ``declared`` of them by ``contract.gain``.
+
+    Raises:
+        ValueError: the first that does not, with its name, what was found and what would be right.
+    """
+    sizes: dict[str, tuple[str, int]] = {}
+    for name, value in gains.items():
+        metadata = declared.get(name, {})
+        if "unit" not in metadata:
+            continue
+        try:
+            array = numbers(value)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+        _refuse_shape(name, array, metadata["shape"])
+        for size, along in zip(array.shape, metadata["shape"], strict=True):
+            if isinstance(along, str):
+                other, count = sizes.setdefault(along, (name, size))
+                if size != count:
+                    raise ValueError(f"{name}: {size} rows for {count} of {other}: give as many")
+        _refuse_values(name, array, metadata)
+
+
+def _refuse_shape(name: str, array: _Array, shape: tuple[int | str | None, ...]) -> None:
+    right = len(array.shape) == len(shape) and all(
+        size == want or not isinstance(want, int)
+        for want, size in zip(shape, array.shape, strict=True)
+    )
+    if not right:
+        words = ["n" if size is None else str(size) for size in shape]
+        want = " x ".join(words) + " numbers" if shape else "one number"
+        raise ValueError(f"{name}: got an array of shape {array.shape}, should be {want}")
+
+
+def _refuse_values(name: str, array: _Array, metadata: Mapping[str, Any]) -> None:
+    unit = f" {metadata['unit']}" if metadata["unit"] else ""
+    for index in map(tuple, np.argwhere(~metadata["range"].admits(array))):
+        place, wrong = "".join(f"[{i}]" for i in index), array[index]
+        demand = metadata["range"].demand(wrong)
+        raise ValueError(f"{name}{place}: got {wrong:g}{unit}, {demand}")
+    if metadata["form"] and (complaint := FORMS[metadata["form"]](array)):
+        raise ValueError(f"{name}: {complaint}")
+
+
+def _inertia(matrix: _Array) -> str:
+    if np.max(np.abs(matrix - matrix.T)) > 1e-9 * np.max(np.abs(matrix)):
+        return f"got {matrix.tolist()}, not symmetric"
+    least = np.linalg.eigvalsh(matrix)[0]
+    if not least > 0.0:
+        return f"not positive definite: a principal moment is {least:g} kg m^2"
+    return ""
+
+
+def _direction(vectors: _Array) -> str:
+    for vector in np.atleast_2d(vectors):
+        if not np.linalg.norm(vector) > 1e-6:
+            return f"got {vector.tolist()}, which has no direction"
+    return ""
+
+
+def _of_norm_one(what: str) -> Callable[[_Array], str]:
+    def complaint(vectors: _Array) -> str:
+        for vector in np.atleast_2d(vectors):
+            norm = float(np.linalg.norm(vector))
+            if not abs(norm - 1.0) <= ROUNDED:
+                return (
+                    f"got {vector.tolist()}, whose norm is {norm:.6g}: "
+                    f"{what} has 1, to within {ROUNDED:g}"
+                )
+        return ""
+
+    return complaint
+
+
+def _increasing(values: _Array) -> str:
+    for i in np.flatnonzero(~(np.diff(values) > 0.0)):
+        return f"[{i + 1}] {values[i + 1]:g} is not after [{i}] {values[i]:g}"
+    return ""
+
+
+FORMS: dict[str, Callable[[_Array], str]] = {
+    "inertia": _inertia,
+    "direction": _direction,
+    "unit vector": _of_norm_one("a unit vector"),
+    "quaternion": _of_norm_one("the quaternion of an attitude"),
+    "increasing": _increasing,
+}
+"""What is wrong with an array of that form; empty where nothing is."""

@@ -1,0 +1,171 @@
+"""What users' code receives is read-only, what it returns is checked, what it raises is located."""
+
+import sysconfig
+import traceback
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from mjspace.contract import Array, Reference, ReferenceSource, Wanted
+from mjspace.errors import FlightError
+
+Tuple = TypeVar("Tuple", bound=Iterable[Any])
+
+STEP = (
+    "it must return (state, command, signals), each a named tuple of arrays; state and signals may "
+    "be None"
+)
+
+_LIBRARIES = tuple(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
+_TESTBED = Path(__file__).parent
+
+
+def read_only(arrays: Tuple) -> Tuple:
+    """Return the (named) tuple after making its arrays read-only, and the arrays they are views of.
+
+    Writing into one of them then raises where it happens, and nobody who kept a reference can
+    change what has been logged.
+    """
+    for array in arrays:
+        while isinstance(array, np.ndarray):
+            array.setflags(write=False)
+            array = array.base
+    return arrays
+
+
+def failure(who: str, error: Exception) -> FlightError:
+    """Return the error that says what ``who``, code of the user's, raised, and in which line."""
+    place = _place(error)
+    hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
+    return FlightError(f"{who} raised {type(error).__name__} at {place}: {error}{hint}")
+
+
+def reference_at(source: ReferenceSource, time: Array) -> Wanted:
+    """Return the reference at each ``time`` [s], shape (n,), read-only arrays with n rows.
+
+    Raises:
+        FlightError: the source raised, or returned no ``Reference`` of that many rows.
+    """
+    try:
+        returned = source.at(time)
+    except Exception as error:
+        raise failure("the reference", error) from error
+    fields = getattr(returned, "_fields", ())
+    if fields[: len(Reference._fields)] != Reference._fields:
+        raise FlightError(
+            f"the reference returned {_described(returned)}: it must return a named tuple that "
+            f"begins with {', '.join(Reference._fields)}"
+        )
+    for field, rows in zip(fields, returned, strict=True):
+        if len(np.shape(rows)) < 2 or len(rows) != len(time):
+            raise FlightError(
+                f"the reference's {field} has the shape {np.shape(rows)} for {len(time)} times: it "
+                f"must be ({len(time)}, ...)"
+            )
+    return read_only(returned)
+
+
+def check_state(state: Any) -> None:
+    """Refuse what is no state of a law.
+
+    Raises:
+        FlightError: neither a named tuple nor None.
+    """
+    if not _is_optional(state):
+        raise FlightError(
+            f"the law's reset returned {_described(state)}: it must return its state, a named "
+            "tuple of arrays, or None"
+        )
+
+
+def check_step(returned: Any) -> None:
+    """Refuse what a law's ``step`` must not return.
+
+    Raises:
+        FlightError: anything but (state, command, signals), with what it is instead.
+    """
+    if type(returned) is not tuple or len(returned) != 3:
+        raise FlightError(f"the law's step returned {_described(returned)}: {STEP}")
+    state, command, signals = returned
+    if not _is_named(command):
+        raise FlightError(
+            f"the law's step returned {_described(returned)}: the command must be a named tuple of "
+            "arrays, such as TorqueCommand(torque)"
+        )
+    for name, part in (("state", state), ("signals", signals)):
+        if not _is_optional(part):
+            raise FlightError(
+                f"the law's step returned {_described(returned)}: the {name} must be a named tuple "
+                "of arrays, or None"
+            )
+
+
+def check_vehicle_axis(name: str, arrays: Any, vehicles: int) -> None:
+    """Refuse a batched law's tuple in which an array does not begin with the vehicle axis.
+
+    Raises:
+        FlightError: the first such field, with its shape.
+    """
+    for field, shape in _by_name(arrays).items():
+        if not shape or shape[0] != vehicles:
+            raise FlightError(
+                f"the law's {name}.{field} has the shape {shape}: of a batched law it must begin "
+                f"with the vehicle axis, ({vehicles}, ...)"
+            )
+
+
+def check_same_shapes(name: str, arrays: Any, first: Any) -> None:
+    """Refuse a law's tuple whose fields or their shapes are not those of its ``first``.
+
+    Raises:
+        FlightError: with the fields or the shapes that differ.
+    """
+    shapes = [getattr(array, "shape", ()) for array in arrays or ()]
+    if shapes == [getattr(array, "shape", ()) for array in first or ()]:
+        return
+    now, before = _by_name(arrays), _by_name(first)
+    if now.keys() != before.keys():
+        raise FlightError(f"the law's {name} has the fields {list(now)} after {list(before)}")
+    changed = next(field for field in now if now[field] != before[field])
+    raise FlightError(
+        f"the law's {name}.{changed} has the shape {now[changed]} after {before[changed]}: shapes "
+        "must not change"
+    )
+
+
+def _by_name(arrays: Any) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each field of a named tuple; nothing for None or an empty tuple."""
+    fields = getattr(arrays, "_fields", ())
+    return {field: np.shape(array) for field, array in zip(fields, arrays or (), strict=True)}
+
+
+def _is_named(value: Any) -> bool:
+    return isinstance(value, tuple) and hasattr(value, "_fields")
+
+
+def _is_optional(value: Any) -> bool:
+    return value is None or _is_named(value) or (isinstance(value, tuple) and not value)
+
+
+def _described(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}"
+    if type(value) is tuple:
+        return f"({', '.join(map(_described, value))})"
+    return "None" if value is None else f"a {type(value).__name__}"
+
+
+def _place(error: Exception) -> str:
+    """Return "file.py:line" of the innermost frame outside of libraries and the testbed."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if _is_users(Path(frame.filename))]
+    frame = (own or frames)[-1]
+    return f"{Path(frame.filename).name}:{frame.lineno}"
+
+
+def _is_users(path: Path) -> bool:
+    if path.is_relative_to(_TESTBED):
+        return path.is_relative_to(_TESTBED / "controllers")
+    return not any(path.is_relative_to(library) for library in _LIBRARIES)

@@ -1,0 +1,139 @@
+"""Values that mean nothing to a number, and everything in a scenario that holds one."""
+
+import dataclasses
+import importlib
+import inspect
+import math
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args
+
+import mjspace.controllers
+import numpy as np
+from pydantic import BaseModel
+
+from mjspace.loading import load, scenario_names
+from mjspace.scenario import Component, Scenario
+
+SCALARS = (math.nan, math.inf, -math.inf, -1.0, 0.0, 400.0, True, "7", "x")
+
+
+@cache
+def scenarios() -> list[Scenario]:
+    """Return every scenario that comes with mjspace."""
+    return [load(name)[0] for name in scenario_names()]
+
+
+_RCS = next(s.plant.rcs for s in scenarios() if s.name == "rcs-three-axis")
+FACTS: dict[str, Any] = {
+    "inertia": np.diag([10.0, 11.0, 12.0]),
+    "wheel_axes": np.eye(3),
+    "wheel_inertia": np.full(3, 0.1),
+    "control_period": 1e-4,
+    "inner_period": 1e-4,
+    "gimbal_axes": np.eye(3),
+    "spin_axes": np.roll(np.eye(3), 1, axis=0),
+    "thruster_positions": np.array(_RCS.positions),
+    "thruster_directions": np.array(_RCS.unit_directions),
+    "thruster_force": np.full(len(_RCS.positions), _RCS.thrust),
+}
+
+
+def kinds() -> Iterator[tuple[str, type]]:
+    """Yield every law and reference that comes with mjspace, as a scenario names it."""
+    for path in sorted(Path(mjspace.controllers.__path__[0]).rglob("[a-z]*.py")):
+        module = importlib.import_module(f"mjspace.controllers.{path.stem}")
+        for name, kind in vars(module).items():
+            own = inspect.isclass(kind) and kind.__module__ == module.__name__
+            flies = own and (hasattr(kind, "batched") or hasattr(kind, "at"))
+            public = dataclasses.is_dataclass(kind) and not name.startswith("_")
+            if flies and public and not inspect.isabstract(kind):
+                yield f"{path.stem}:{name}", kind
+
+
+def gains_of(name: str, kind: type) -> dict[str, Any]:
+    """Return gains that fit: those of a scenario that flies it, else made from the declaration."""
+    for scenario in scenarios():
+        for component in (scenario.law, scenario.reference):
+            if component.kind == name:
+                return component.gains
+    required = [
+        field
+        for field in dataclasses.fields(kind)
+        if field.default is dataclasses.MISSING
+        and field.default_factory is dataclasses.MISSING
+        and field.name not in FACTS
+    ]
+    return {field.name: _fit(field.metadata) for field in required}
+
+
+def _fit(metadata: Any) -> Any:
+    shape = [size if isinstance(size, int) else 4 for size in metadata["shape"]]
+    if metadata["form"] == "increasing":
+        return list(np.arange(4.0))
+    value = np.zeros(shape) if metadata["form"] else np.ones(shape)
+    if metadata["form"]:
+        value[..., 0] = 1.0
+    return value.tolist()
+
+
+def spoilt(value: Any) -> Iterator[Any]:
+    """Yield what a number, or an array of them, may be replaced by that it should not be."""
+    yield from ([], [[[1.0]]], {})
+    for scalar in SCALARS:
+        yield with_first(value, scalar)
+    if isinstance(value, list):
+        yield from (1.0, value[:-1], [*value, *value[:1]], [value])
+
+
+def with_first(value: Any, scalar: Any) -> Any:
+    """Return nested lists with their first number replaced."""
+    if isinstance(value, list) and value:
+        return [with_first(value[0], scalar), *value[1:]]
+    return scalar
+
+
+def first(value: Any) -> Any:
+    """Return the first number of nested lists."""
+    while isinstance(value, list) and value:
+        value = value[0]
+    return value
+
+
+def tables() -> dict[type[BaseModel], list[dict[str, Any]]]:
+    """Return each table of a scenario with examples of it, from the scenarios and by default."""
+    found: dict[type[BaseModel], list[dict[str, Any]]] = {}
+    for kind in _kinds_in(Scenario):
+        try:
+            found[kind] = [kind().model_dump(mode="python")]
+        except ValueError:
+            found[kind] = []
+    for scenario in scenarios():
+        for model in _models_in(scenario):
+            dump = {k: v for k, v in model.model_dump(mode="python").items() if v is not None}
+            found[type(model)].append(dump)
+    return found
+
+
+def _kinds_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if inspect.isclass(annotation) and issubclass(annotation, BaseModel):
+        if annotation is not Component:
+            yield annotation
+            for field in annotation.model_fields.values():
+                yield from _kinds_in(field.annotation)
+        return
+    for part in get_args(annotation):
+        yield from _kinds_in(part)
+
+
+def _models_in(value: Any) -> Iterator[BaseModel]:
+    if isinstance(value, Component):
+        return
+    if isinstance(value, BaseModel):
+        yield value
+        for name in type(value).model_fields:
+            yield from _models_in(getattr(value, name))
+    elif isinstance(value, list | dict):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _models_in(item)
