@@ -15,26 +15,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 LONG = 100_000  # integration steps, as in test_scenarios
 
 UNFINISHED = {
-    "contraction-adaptive",
-    "contraction-gradient",
-    "contraction-ideal",
-    "contraction-identification",
-    "contraction-noise",
-    "contraction-regulation",
-    "dgvscmg-against-wheels",
-    "dgvscmg-free",
-    "dgvscmg-ideal",
-    "dgvscmg-imbalance",
-    "dgvscmg-low-momentum",
-    "dgvscmg-no-rejection",
-    "dgvscmg-sensorless",
-    "dgvscmg-singularity",
-    "dgvscmg-slow-loops",
-    "dgvscmg-thesis",
-    "dgvscmg-tracking",
-    "dgvscmg-unloading",
-    "immersion-invariance",
-    "immersion-invariance-slow",
     "lander",
     "lander-craters",
     "lander-cubic",
@@ -47,11 +27,6 @@ UNFINISHED = {
     "lander-slope",
     "lander-ten-hertz",
     "lander-thrifty",
-    "pd-plus",
-    "pd-plus-modified",
-    "pd-plus-robust",
-    "pmsm-speed",
-    "pmsm-speed-no-rejection",
 }
 """Scenarios whose checks do not all say yet what they fail with."""
 
