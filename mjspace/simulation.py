@@ -12,13 +12,14 @@ from mujoco.batch import Batch, SimulationError
 from mjspace import environment, mujoco_log
 from mjspace.assembly import Assembly
 from mjspace.columns import Columns
+from mjspace.combined_actuators import weigh
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.crossings import with_crossings
 from mjspace.environment_kernel import FIELD
 from mjspace.errors import FlightError
 from mjspace.held_disturbance import HeldDisturbance
 from mjspace.start import Start, last_period
-from mjspace.tape import Block, Tape, until_trouble
+from mjspace.tape import Block, Happening, Tape, until_trouble
 
 BLOCK_PERIODS = 500
 BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
@@ -75,8 +76,7 @@ class _Flight:
         scenario = assembly.scenario
         mujoco_log.silence()
         environment.install()
-        self.assembly = assembly
-        self.columns = Columns(assembly)
+        self.assembly, self.columns = assembly, Columns(assembly)
         self.suite = assembly.sensors(members)
         self.sensors, self.law_state = start.sensors, start.law
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
@@ -86,8 +86,7 @@ class _Flight:
         if start.model:
             self.batch.set_const()
         self.applied = assembly.actuators.inputs(self.batch, assembly.vehicle.motors)
-        deployed = assembly.deployed
-        self.deployments = deployed and deployed(self.batch)
+        self.deployments = assembly.deployed and assembly.deployed(self.batch)
         self.field = assembly.field
         if self.field is not None:
             self.acting_field = self.batch.bind("userdata")[:, FIELD]
@@ -97,15 +96,15 @@ class _Flight:
         self.inner = getattr(assembly.law, "inner", None)
         self.push = None
         if assembly.disturbance is not None:
-            bus = assembly.vehicle.model.body("bus").id
-            applied = self.batch.bind("xfrc_applied")[:, bus]
+            applied = self.batch.bind("xfrc_applied")[:, assembly.vehicle.model.body("bus").id]
             self.push = HeldDisturbance(assembly.disturbance, applied)
-        self.hold = assembly.hold
-        self.driven_stepwise = assembly.driven_stepwise
-        acts = self.push is not None or self.deployments is not None
-        self.stepwise = self.driven_stepwise or acts
+        self.hold, self.driven_stepwise = assembly.hold, assembly.driven_stepwise
+        self.ground = self.columns.ground
+        others = (self.push, self.deployments, self.ground)
+        self.stepwise = self.driven_stepwise or any(part is not None for part in others)
         self.steps = scenario.rates.steps
         self.tick = math.gcd(self.steps, *self.suite.ticks)
+        self.later = list[Happening]()
         recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
         self.periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
 
@@ -115,6 +114,7 @@ class _Flight:
         end = min(first + self.periods - 1, last)
         wanted = self.assembly.reference.at(np.arange(first, end + 1, dtype=float) * control)
         tape = Tape(first, wanted)
+        tape.happened, self.later = self.later, []
         due = clock.monotonic() + BLOCK_SECONDS
         now = first * control
         try:
@@ -128,6 +128,8 @@ class _Flight:
                         break
         except (SimulationError, FlightError) as error:
             return tape, f"stopped at t = {now:.6g} s: {error}"
+        until = (first + len(tape) - 1) * control  # what follows is told with the next block
+        self.later = [event for event in tape.happened if event[0] > until]
         raised = np.flatnonzero(self.batch.warning[:, :, 1].any(axis=0))
         if len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name
@@ -138,6 +140,10 @@ class _Flight:
         self, tape: Tape, period: int, now: float, reference: Wanted, *, flown: bool
     ) -> None:
         physics = self.batch.state.copy()
+        if self.ground is not None:
+            # At stage POS alone, MuJoCo 4.0 shows no kinetic energy after the step that follows.
+            self.batch.forward(stage=mujoco.mjtStage.mjSTAGE_VEL)
+            self._touch(tape, now, physics)
         truth = self._truth(physics)
         tape.physics.append(physics)
         tape.sensors.append(self.sensors)
@@ -198,30 +204,25 @@ class _Flight:
                     f"the law's inner loop raised {type(error).__name__}: {error}"
                 ) from error
         before = self.actuator_state
-        self.actuator_state, given, saturated = self.actuators.act(
-            before, command, truth, self.hold
-        )
+        after, given, saturated = self.actuators.act(before, command, truth, self.hold)
+        self.actuator_state = after
         if self.faults is not None:
             self.actuator_state, given = self.faults.change(self.actuator_state, given, now)
         for view, torque in zip(self.applied, given, strict=True):
             view[:] = torque
-        self._weigh(self.actuators.masses(before, self.actuator_state))
+        weigh(self.batch, self.actuators.masses(before, self.actuator_state))
         return given, saturated
 
-    def _weigh(self, masses: list[tuple[str, int, Array]]) -> None:
-        """Give bodies the masses of the middle of the integration step.
-
-        The constants that MuJoCo derives from them take 0.6 of a step's time: they are derived
-        again only where something burns.
-        """
-        fields = [(self.batch.expand(name)[:, body], values) for name, body, values in masses]
-        if any(not np.array_equal(field, values) for field, values in fields):
-            for field, values in fields:
-                field[:] = values
-            self.batch.set_const()
-
     def _truth(self, physics: Array) -> Measurement:
-        return self.actuators.seen(self.actuator_state, self.columns.truth(physics))
+        truth = self.actuators.seen(self.actuator_state, self.columns.truth(physics))
+        return truth if self.ground is None else self.ground.seen(self.actuator_state, truth)
+
+    def _touch(self, tape: Tape, now: float, physics: Array) -> None:
+        """Note what touches the ground at ``now``, which the derived fields describe."""
+        if self.ground is not None:
+            state, data = self.actuator_state, self.sensordata
+            self.actuator_state, happened = self.ground.update(state, physics, data, now)
+            tape.happened += happened
 
     def _rest_of_period(self, tape: Tape, first_step: int, command: Any) -> None:
         """Integrate from the period's first substep to its end, with the samples due in between."""
@@ -244,4 +245,6 @@ class _Flight:
                     tape.happened += self.deployments(now)
             count = 1 if self.stepwise else self.tick - step % self.tick
             self.batch.step(nstep=count)
+            if self.stepwise:
+                self._touch(tape, now, physics)
             step += count

@@ -51,7 +51,6 @@ UNFINISHED = {
     "lander-cubic",
     "lander-dispersed",
     "lander-engine-lag",
-    "lander-engine-out",
     "lander-estimated",
     "lander-paper",
     "lander-printed",

@@ -28,6 +28,7 @@ ONLY_IN = {
             "composition",
             "start",
             "columns",
+            "ground_contact",
             "environment",
             "struct_offsets",
             "guards",
