@@ -8,7 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from mjspace import addresses, central_gravity, deployments, environment, faults, plant
+from mjspace import (
+    addresses,
+    central_gravity,
+    deployments,
+    environment,
+    faults,
+    ground_contact,
+    plant,
+)
 from mjspace.actuators import Actuators, IdealThrusters
 from mjspace.combined_actuators import Together
 from mjspace.components import construct, load_object
@@ -20,6 +28,7 @@ from mjspace.faults import FaultSet
 from mjspace.geomagnetism import FieldAlongOrbit, along
 from mjspace.gimbal_servos import GimbalServos
 from mjspace.hinge_tables import Friction
+from mjspace.landing_tables import Engine
 from mjspace.magnetorquers import CoilSet
 from mjspace.motor_drives import MotorDrives
 from mjspace.one_by_one import OneByOne
@@ -27,7 +36,7 @@ from mjspace.plant import Vehicle
 from mjspace.reaction_wheels import ReactionWheels
 from mjspace.scenario import Component, Scenario
 from mjspace.sensors import SensorSuite
-from mjspace.tables import PlantTable, Rates
+from mjspace.tables import PlantTable
 from mjspace.thrusters import Thrusters
 from mjspace.user_files import files_of, source_of
 
@@ -147,6 +156,8 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
     qpos, qvel = _part("initial", plant.initial_state, vehicle, scenario.initial)
     parts = scenario.plant.parts
     deployments.stow(vehicle.model, qpos, parts)
+    if scenario.plant.ground is not None:
+        _part("initial.position", ground_contact.refuse_buried, vehicle.model, qpos)
     assembly = Assembly(
         scenario=scenario.model_copy(update=flown),
         vehicle=vehicle,
@@ -161,14 +172,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             ripple,
         ),
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
-        actuators=_part(
-            "plant",
-            _actuators,
-            vehicle,
-            scenario.plant,
-            scenario.rates,
-            inner=hasattr(law, "inner"),
-        ),
+        actuators=_part("plant", _actuators, vehicle, scenario, hasattr(law, "inner")),
         reference=reference,
         law=law if getattr(law, "batched", False) else OneByOne(law),
         deployed=deployments.of(vehicle.model, qpos, parts, scenario.rates.physics),
@@ -218,15 +222,15 @@ def _in_log(role: str, kind: str, found: Any, sources: dict[str, bytes]) -> str:
     return f"{role}/{file}:{name}"
 
 
-def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates, *, inner: bool) -> Together:
-    kinds: list[Actuators] = []
+def _actuators(vehicle: Vehicle, scenario: Scenario, inner: bool) -> Together:
+    table, rates, kinds = scenario.plant, scenario.rates, list[Actuators]()
     if table.drives:
         driven = [table.drives[name] for name in vehicle.motors if name in table.drives]
         kinds.append(MotorDrives.of(vehicle, driven))
     if table.servos is not None:
         kinds.append(GimbalServos.of(vehicle, table.servos))
     if table.engine is not None:
-        kinds.append(GimballedEngine.of(vehicle, table.engine))
+        kinds.append(_engine(vehicle, table.engine, scenario))
     others = table.ideal_thrusters or table.rcs or table.magnetorquers
     if table.wheels.axes or not (kinds or others):
         alone = not (kinds or others)
@@ -240,6 +244,16 @@ def _actuators(vehicle: Vehicle, table: PlantTable, rates: Rates, *, inner: bool
         axes = np.array(coils.axes) / np.linalg.norm(coils.axes, axis=1, keepdims=True)
         kinds.append(CoilSet(axes, coils.dipole_limit or np.inf, coils.time_constant))
     return Together(tuple(kinds))
+
+
+def _engine(vehicle: Vehicle, table: Engine, scenario: Scenario) -> GimballedEngine:
+    """Return the engine, burning at trim unless ``initial.thrust`` says otherwise."""
+    gravity = 0.0
+    if (around := scenario.environment.gravity) is not None:
+        place = np.array(scenario.initial.position, dtype=float)
+        pull = central_gravity.acceleration(central_gravity.pack(around), place)
+        gravity = float(np.linalg.norm(pull))
+    return GimballedEngine.of(vehicle, table, gravity=gravity, thrust=scenario.initial.thrust)
 
 
 def _of_thrusters(table: PlantTable) -> dict[str, Any]:

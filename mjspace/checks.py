@@ -19,6 +19,9 @@ Topics = Mapping[str, Mapping[str, tuple[int, ...]]]
 
 Outcome = Literal["PASS", "FAIL", "not measured"]
 
+NO_CRASH = Check(name="no crash", signal="truth.crash", statistic="max", below=0.5)
+"""What a vehicle over a ground is checked for, unless the scenario itself looks at that signal."""
+
 TICK = 1e-9
 """s: what the log's stamps can tell apart."""
 
@@ -85,12 +88,17 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
 def judge(log: Log, checks: Sequence[Check], events: Sequence[Event] = ()) -> list[Verdict]:
     """Return the verdict of each check, from the log alone, one chunk of it in memory at a time.
 
+    A vehicle over a ground is checked for ``NO_CRASH`` as well.
+
     ``events`` are the scenario's, which checks may count from; one that never happened leaves
     nothing to measure.
 
     Raises:
         ValueError: a check or an event names a signal that the log does not have.
     """
+    if "crash" in log.topics.get("/truth", {}):
+        own = any(check.signal == NO_CRASH.signal for check in checks)
+        checks = checks if own else [*checks, NO_CRASH]
     named = [name for check in checks for name in (check.since, check.until) if name]
     happened = {event.name: _first(log, event) for event in events if event.name in named}
     return [_verdict(log, check, happened) for check in checks]

@@ -5,13 +5,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace import attitude, kepler
+from mjspace import attitude, ground_contact, kepler
 from mjspace.assembly import Assembly
 from mjspace.contract import Array, Measurement, Truth
 from mjspace.sensors import NAVIGATION
-
-PRESSED = 0.001
-"""m that a leg's strut gives when its foot stands on the ground; in flight it is drawn out."""
 
 
 class Columns:
@@ -33,7 +30,8 @@ class Columns:
         self.gimbal_rate = _columns(before_qvel + vehicle.gimbal_dof)
         self.wheel_angle = _columns(before_qpos + vehicle.wheel_qpos)
         self.struts = _columns(before_qpos + vehicle.strut_qpos)
-        self.has_legs = len(vehicle.strut_qpos) > 0
+        self.feet = len(vehicle.strut_qpos)
+        self.ground = ground_contact.of(model, self.struts, self.velocity)
         sensors = assembly.scenario.sensors
         self.navigates = any(getattr(sensors, name) is not None for name in NAVIGATION)
         self.has_velocimeter = sensors.ground_velocity is not None
@@ -43,11 +41,15 @@ class Columns:
         self.orbit = None if orbit is None else kepler.pack(orbit)
 
     def truth(self, physics: Array) -> Measurement:
-        """Return what ideal sensors see, as views of the state rows where that is possible."""
+        """Return what ideal sensors see, as views of the state rows where that is possible.
+
+        Nothing touches the ground: that is in the actuators' state, which ``ground`` keeps.
+        """
         seen = self.motion(physics)
-        if self.has_legs:
-            standing = np.sum(physics[..., self.struts] > PRESSED, axis=-1, keepdims=True) >= 2
-            seen = seen._replace(contact=standing.astype(float))
+        if self.feet:
+            none = np.zeros((*physics.shape[:-1], self.feet))
+            one = none[..., :1]
+            seen = seen._replace(contact=one, foot_contact=none, hull_contact=one)
         if self.navigates:
             position, velocity = physics[..., self.position], physics[..., self.velocity]
             seen = seen._replace(position=position, velocity=velocity, altitude=position[..., 2:])

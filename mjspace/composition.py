@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace import mass
+from mjspace import ground_contact, mass
 from mjspace.components import nearest
 from mjspace.contract import Array
 from mjspace.deployment_tables import Deployment
@@ -187,6 +187,7 @@ def _attach_ground(spec: Any, ground: Ground) -> None:
     frame = spec.worldbody.add_frame()
     mujoco.mju_axisAngle2Quat(frame.quat, np.array(across), ground.slope)
     spec.attach(mujoco.MjSpec.from_file(str(file)), prefix="site_", frame=frame)
+    ground_contact.add_sensors(spec, "site_ground")
 
 
 def _exit(half_size: Array, axis: Array) -> float:

@@ -47,12 +47,16 @@ class Measurement(NamedTuple):
     propellant: Array = np.zeros(0)
     """Left in the tank, the engine's before the thrusters' [kg], shape (..., n)."""
     contact: Array = np.zeros(0)
-    """1.0 while at least two feet stand on the ground, else 0.0, shape (..., 1)."""
+    """1.0 while at least two feet or the hull touch the ground, else 0.0, shape (..., 1)."""
     wheel_angle: Array = np.zeros(0)
     """Angles of the wheels with an electrical side, relative to what carries them [rad], shape
     (..., n)."""
     magnetic_field: Array = np.zeros(0)
     """Of the Earth, body axes [T], shape (..., 3)."""
+    foot_contact: Array = np.zeros(0)
+    """1.0 for each foot that touches the ground, else 0.0, shape (..., f)."""
+    hull_contact: Array = np.zeros(0)
+    """1.0 while anything else of the vehicle touches the ground, else 0.0, shape (..., 1)."""
 
 
 class Truth(NamedTuple):
@@ -77,6 +81,8 @@ class Truth(NamedTuple):
     contact: Array
     wheel_angle: Array
     magnetic_field: Array
+    foot_contact: Array
+    hull_contact: Array
     orbit_position: Array
     """Of the frame's origin from the planet's centre, inertial axes [m], shape (3,)."""
     orbit_velocity: Array

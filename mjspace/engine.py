@@ -29,6 +29,8 @@ class GimballedEngine:
     """Principal moments [kg m^2] of that body for each kilogram in it, shape (3,)."""
     propellant: float
     """At the start [kg]."""
+    thrust: float
+    """At the start [N]."""
 
     logged_as: ClassVar[str] = "engine"
     takes: ClassVar[Fields] = {"thrust": (1, "N"), "gimbal": (2, "rad")}
@@ -36,8 +38,14 @@ class GimballedEngine:
     stateful: ClassVar[bool] = True
 
     @classmethod
-    def of(cls, vehicle: Vehicle, table: Engine) -> Self:
-        """Return the engine of a vehicle that has one, and a body called ``tank``."""
+    def of(
+        cls, vehicle: Vehicle, table: Engine, *, gravity: float = 0.0, thrust: float | None = None
+    ) -> Self:
+        """Return the engine of a vehicle that has one, and a body called ``tank``.
+
+        It burns at the start with ``thrust`` [N], by default at trim: it holds the vehicle's weight
+        in ``gravity`` [m/s^2] as far as its throttle goes; without gravity it is cold.
+        """
         model = vehicle.model
         tank = model.body("tank").id
         flow = 0.0
@@ -53,24 +61,30 @@ class GimballedEngine:
             1.0 / table.gimbal_lag,
             table.gimbal_rate_gain,
             np.inf if table.fails_at is None else table.fails_at,
+            table.gimbal_torque_limit,
         ]
         held = float(model.body_mass[tank])
+        propellant = held if table.propellant is None else table.propellant
+        if thrust is None:
+            weight = (float(np.sum(model.body_mass)) - held + propellant) * gravity
+            thrust = float(np.clip(weight, table.thrust_min, table.thrust_max)) if weight else 0.0
         return cls(
             np.array(data),
             tank if flow else 0,
             model.body_inertia[tank] / held,
-            held if table.propellant is None else table.propellant,
+            propellant,
+            thrust,
         )
 
     def reset(self, vehicles: int) -> State:
-        """Return an engine that is about to start.
+        """Return an engine that burns with its thrust of the start.
 
         Its fields, (N, 1): "thrust" [N], "propellant" [kg], "burning" (1.0 until it is put out or
         has run dry) and "clock" [s].
         """
         one = np.ones((vehicles, 1))
         return {
-            "thrust": 0.0 * one,
+            "thrust": self.thrust * one,
             "propellant": self.propellant * one,
             "burning": one,
             "clock": 0.0 * one,
@@ -123,7 +137,7 @@ def _engine(
     cut: Any,
 ) -> None:
     """Advance thrust, tank and clock by ``step`` [s]; give the torques and the mean thrust."""
-    least, most, lag, flow, limit, rate_limit, position_gain, rate_gain, fails_at = data
+    least, most, lag, flow, limit, rate_limit, position_gain, rate_gain, fails_at, strongest = data
     thrust, left, burning, clock = state
     # What is asked of an engine that is out stays unheard: it does not start twice.
     if wanted[0] <= 0.0 or clock >= fails_at or left <= 0.0:
@@ -140,5 +154,6 @@ def _engine(
     for i in range(2):
         goal = min(max(wanted[1 + i], -limit), limit)
         pace = min(max(position_gain * (goal - angle[i]), -rate_limit), rate_limit)
-        acting[i] = rate_gain * (pace - rate[i])
-        cut[i] = 1.0 if goal != wanted[1 + i] else 0.0
+        torque = rate_gain * (pace - rate[i])
+        acting[i] = min(max(torque, -strongest), strongest)
+        cut[i] = 1.0 if goal != wanted[1 + i] or acting[i] != torque else 0.0

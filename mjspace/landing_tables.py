@@ -58,6 +58,8 @@ class Engine(Table):
     """Time constant of the position loop."""
     gimbal_rate_gain: Annotated[Positive, Si("N m s/rad")] = 10.0
     """Of the rate loop."""
+    gimbal_torque_limit: Annotated[Positive, Si("N m")] = 10.0
+    """Largest torque of each gimbal's motor, beyond which it is saturated."""
     fails_at: Seconds | None = None
     """When the engine goes out by itself; never when left out."""
 

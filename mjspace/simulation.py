@@ -12,6 +12,7 @@ from mujoco.batch import Batch, SimulationError
 from mjspace import environment, mujoco_log
 from mjspace.assembly import Assembly
 from mjspace.columns import Columns
+from mjspace.combined_actuators import weigh
 from mjspace.contract import Array, Measurement, Wanted
 from mjspace.crossings import with_crossings
 from mjspace.environment_kernel import FIELD
@@ -86,8 +87,7 @@ class _Flight:
         scenario = assembly.scenario
         mujoco_log.silence()
         environment.install()
-        self.assembly = assembly
-        self.columns = Columns(assembly)
+        self.assembly, self.columns = assembly, Columns(assembly)
         self.suite = assembly.sensors(members)
         self.sensors, self.law_state = start.sensors, start.law
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
@@ -97,8 +97,7 @@ class _Flight:
         if start.model:
             self.batch.set_const()
         self.applied = assembly.actuators.inputs(self.batch, assembly.vehicle.motors)
-        deployed = assembly.deployed
-        self.deployments = deployed and deployed(self.batch)
+        self.deployments = assembly.deployed and assembly.deployed(self.batch)
         self.field = assembly.field
         if self.field is not None:
             self.acting_field = self.batch.bind("userdata")[:, FIELD]
@@ -110,13 +109,12 @@ class _Flight:
         self.returned: Any = None
         self.push = None
         if assembly.disturbance is not None:
-            bus = assembly.vehicle.model.body("bus").id
-            applied = self.batch.bind("xfrc_applied")[:, bus]
+            applied = self.batch.bind("xfrc_applied")[:, assembly.vehicle.model.body("bus").id]
             self.push = HeldDisturbance(assembly, self.columns, applied)
-        self.hold = assembly.hold
-        self.driven_stepwise = assembly.driven_stepwise
-        acts = self.push is not None or self.deployments is not None
-        self.stepwise = self.driven_stepwise or acts
+        self.hold, self.driven_stepwise = assembly.hold, assembly.driven_stepwise
+        self.ground = self.columns.ground
+        others = (self.push, self.deployments, self.ground)
+        self.stepwise = self.driven_stepwise or any(part is not None for part in others)
         self.steps = scenario.rates.steps
         self.tick = math.gcd(self.steps, *self.suite.ticks)
         recorded = 4 * self.batch.state.nbytes  # each period, with law, signals and measurement
@@ -158,6 +156,10 @@ class _Flight:
         self, tape: Tape, period: int, now: float, reference: Wanted, *, flown: bool
     ) -> None:
         physics = self.batch.state.copy()
+        if self.ground is not None:
+            # At stage POS alone, MuJoCo 4.0 shows no kinetic energy after the step that follows.
+            self.batch.forward(stage=mujoco.mjtStage.mjSTAGE_VEL)
+            self._touch(tape, now, physics)
         truth = self._truth(physics)
         tape.physics.append(physics)
         tape.sensors.append(self.sensors)
@@ -239,27 +241,27 @@ class _Flight:
                 raise failure("the law's inner loop", error) from error
             read_only(self.law_state)
         before = self.actuator_state
-        self.actuator_state, given, saturated = self.actuators.act(
-            before, command, truth, self.hold
-        )
+        after, given, saturated = self.actuators.act(before, command, truth, self.hold)
+        self.actuator_state = after
         if self.faults is not None:
             self.actuator_state, given = self.faults.change(self.actuator_state, given, now)
         for view, torque in zip(self.applied, given, strict=True):
             view[:] = torque
-        self._weigh(self.actuators.masses(before, self.actuator_state))
+        weigh(self.batch, self.actuators.masses(before, self.actuator_state))
         return given, saturated
 
-    def _weigh(self, masses: list[tuple[str, int, Array]]) -> None:
-        """Give bodies the masses of the middle of the integration step; idle where none burns."""
-        fields = [(self.batch.expand(name)[:, body], values) for name, body, values in masses]
-        # What MuJoCo derives from masses takes 0.6 of the time of a step.
-        if any(not np.array_equal(field, values) for field, values in fields):
-            for field, values in fields:
-                field[:] = values
-            self.batch.set_const()
-
     def _truth(self, physics: Array) -> Measurement:
-        return read_only(self.actuators.seen(self.actuator_state, self.columns.truth(physics)))
+        truth = self.actuators.seen(self.actuator_state, self.columns.truth(physics))
+        if self.ground is not None:
+            truth = self.ground.seen(self.actuator_state, truth)
+        return read_only(truth)
+
+    def _touch(self, tape: Tape, now: float, physics: Array) -> None:
+        """Note what touches the ground at ``now``, which the derived fields describe."""
+        if self.ground is not None:
+            state, data = self.actuator_state, self.sensordata
+            self.actuator_state, happened = self.ground.update(state, physics, data, now)
+            tape.happened += happened
 
     def _rest_of_period(self, tape: Tape, first_step: int, command: Any) -> None:
         """Integrate from the period's first substep to its end, with the samples due in between."""
@@ -286,4 +288,6 @@ class _Flight:
                     tape.happened += self.deployments(now)
             count = 1 if self.stepwise else self.tick - step % self.tick
             self.batch.step(nstep=count)
+            if self.stepwise:
+                self._touch(tape, now, physics)
             step += count

@@ -50,5 +50,9 @@ def first_start(assembly: Assembly, members: Sequence[int]) -> Start:
     actuators = assembly.actuators.reset(len(members))
     if (faults := assembly.faults(members)) is not None:
         actuators |= faults.reset()
-    truth = assembly.actuators.seen(actuators, Columns(assembly).truth(physics))
+    columns = Columns(assembly)
+    truth = assembly.actuators.seen(actuators, columns.truth(physics))
+    if columns.ground is not None:
+        actuators |= columns.ground.reset(physics)
+        truth = columns.ground.seen(actuators, truth)
     return Start(0, physics, assembly.sensors(members).reset(truth), None, actuators)

@@ -208,6 +208,9 @@ class Initial(Table):
     momentum: Momentum3 | None = None
     """Or the wanted total angular momentum about the centre of mass, inertial axes: the wheel
     speeds follow (the smallest, where more than three wheels can make it)."""
+    thrust: Annotated[NonNegative, Si("N")] | None = None
+    """Of the engine; at trim when left out: what holds the vehicle's weight where it starts, within
+    the throttle's range, and none without gravity."""
 
     @model_validator(mode="after")
     def _one_of_each(self) -> "Initial":

@@ -98,6 +98,10 @@ class Tape:
             name: np.array([s[name] for s in self.actuators[:n]]) for name in self.actuators[0]
         }
         truth = assembly.actuators.seen(actuators, columns.truth(physics))
+        on_ground = {}
+        if columns.ground is not None:
+            truth = columns.ground.seen(actuators, truth)
+            on_ground = columns.ground.logged(actuators, data)
         state = {"physics": physics}
         state |= {f"actuator_{name}": a for name, a in actuators.items()}
         state |= {f"law_{name}": a for name, a in _fields(self.law[:n]).items()}
@@ -112,6 +116,7 @@ class Tape:
             "/state": state,
             "/truth": {
                 **_without_empty(truth._asdict()),
+                **on_ground,
                 "position": physics[..., columns.position],
                 "velocity": physics[..., columns.velocity],
                 **_about_the_place(physics[..., columns.position], truth.attitude, reference),

@@ -20,7 +20,6 @@ UNFINISHED = {
     "lander-cubic",
     "lander-dispersed",
     "lander-engine-lag",
-    "lander-engine-out",
     "lander-estimated",
     "lander-paper",
     "lander-printed",

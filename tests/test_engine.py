@@ -138,3 +138,30 @@ def test_a_batch_is_its_vehicles() -> None:
         np.testing.assert_array_equal(acting[i], acting_one[0])
         for name, values in after.items():
             np.testing.assert_array_equal(values[i], after_one[name][0])
+
+
+def test_a_gimbals_motor_has_a_largest_torque_and_says_when_it_is_reached() -> None:
+    flown = engine(gimbal_lag=0.05, gimbal_rate_gain=100.0, gimbal_torque_limit=12.0)
+    command = ThrustCommand(np.array([[100.0]]), np.array([[0.3, -0.3]]))
+    _, acting, cut = flown.act(flown.reset(1), command, seen(), STEP)
+    np.testing.assert_array_equal(acting[0, :2], [12.0, -12.0])
+    np.testing.assert_array_equal(cut[0], [1.0, 1.0, 0.0])
+    small = ThrustCommand(np.array([[100.0]]), np.array([[0.005, 0.0]]))
+    _, acting, cut = flown.act(flown.reset(1), small, seen(), STEP)
+    assert acting[0, 0] == pytest.approx(10.0)
+    assert not cut.any()
+    assert Engine(thrust_max=1.0).gimbal_torque_limit == 10.0
+
+
+@pytest.mark.parametrize(
+    ("propellant", "thrust", "starts"),
+    [(None, None, 20.0 * 1.6), (40.0, None, 64.0), (2.0, None, 10.0), (None, 7.0, 7.0)],
+)
+def test_it_starts_at_trim_or_as_it_is_told(
+    propellant: float | None, thrust: float | None, starts: float
+) -> None:
+    """The vehicle is the tank alone, in 1.6 m/s^2; the throttle's range is 10 to 80 N."""
+    table = Engine(thrust_max=80.0, thrust_min=10.0, propellant=propellant)
+    flown = GimballedEngine.of(Vehicle(), table, gravity=1.6, thrust=thrust)
+    assert flown.reset(3)["thrust"] == pytest.approx(np.full((3, 1), starts))
+    assert GimballedEngine.of(Vehicle(), table).reset(1)["thrust"] == 0.0

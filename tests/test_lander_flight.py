@@ -236,3 +236,19 @@ def test_an_engine_that_fails_ends_in_an_impact_that_is_told() -> None:
     speed = rows["/truth"]["velocity"][np.searchsorted(rows["time"], first[0]) - 1, 0]
     assert speed[2] < -3.5  # m/s
     assert not rows["/truth"]["thrust"][rows["time"] > 6.1].any()
+
+
+def test_the_engine_burns_at_trim_when_the_flight_begins() -> None:
+    """At 100 kg, 1004 m up; cold, with a lag of half a second, it is 0.8 m lower after 5 s."""
+    begins = built("lander")
+    start = first_start(begins, (0,))
+    distance = RADIUS + 1003.8
+    place = np.array([2000.0, 1500.0, distance])
+    weight = 100.0 * GM / (place @ place)
+    assert start.actuators["thrust"][0, 0] == pytest.approx(weight, rel=1e-12)
+    lag = ("plant.engine.thrust_lag='0.5 s'", "duration=5")
+    warm, cold = (flown(built("lander", *lag, *more)) for more in ((), ("initial.thrust='0 N'",)))
+    assert warm["/truth"]["thrust"][0, 0, 0] == pytest.approx(weight, rel=1e-12)
+    assert cold["/truth"]["thrust"][0, 0, 0] == 0.0
+    lower = warm["/truth"]["position"][-1, 0, 2] - cold["/truth"]["position"][-1, 0, 2]
+    assert lower == pytest.approx(0.82, abs=0.05)

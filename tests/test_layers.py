@@ -29,6 +29,7 @@ ONLY_IN = {
             "composition",
             "start",
             "columns",
+            "ground_contact",
             "environment",
             "bearing_friction",
             "struct_offsets",

@@ -11,6 +11,9 @@ import pytest
 from lander_laws import FIGURE_6, LANDS, LEAST_CORRECTED, MIXED
 from lander_oracle import Flight, fly
 from mjspace.controllers.descent import SineDescent
+from mjspace.controllers.lander import VariableStructure
+
+from mjspace.contract import Measurement, Trajectory
 
 
 class Row(NamedTuple):
@@ -85,3 +88,23 @@ def test_the_step_and_the_sample_are_short_enough() -> None:
     assert np.abs(coarse.position - finer.position).max() < 1e-8
     faster = fly(LANDS, reference, duration=40.0, period=0.01)
     assert np.abs(coarse.position - faster.position[::2]).max() < 0.05  # 0.023 m measured
+
+
+@pytest.mark.parametrize("axes", [(), (3,)])
+def test_the_thrust_follows_the_mass_that_the_tank_shows(axes: tuple[int, ...]) -> None:
+    """Half of 20 kg gone from 100 kg: 90 kg need nine tenths of the thrust, less what U1 adds."""
+    law = VariableStructure(tank=20.0, thrust_range=np.array([0.0, 1000.0]))
+    still = np.zeros((*axes, 3))
+    upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (*axes, 4)).copy()
+    none = np.zeros((*axes, 0))
+    wanted = Trajectory(upright, still, still, still, still, still)
+    thrusts = []
+    for left in (20.0, 10.0):
+        seen = Measurement(
+            upright, still, none, position=still, velocity=still,
+            propellant=np.full((*axes, 1), left),
+        )  # fmt: skip
+        _, command, _ = law.step(law.reset(seen, wanted), 0.0, seen, wanted)
+        thrusts.append(command.thrust)
+    np.testing.assert_allclose(thrusts[0], 100.0 * 4.902e12 / 1.738e6**2, rtol=1e-9)
+    np.testing.assert_allclose(thrusts[1], 0.9 * thrusts[0], rtol=1e-9)
