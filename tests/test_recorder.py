@@ -61,7 +61,7 @@ def test_frames_are_those_of_the_state(log: Log) -> None:
     assert sorted(found) == [10_000_000 * k for k in range(11)]  # 100 times a second
     for stamp, message in found.items():
         row = log.nearest("/state", stamp / 1e9)
-        assert round(row["time"] * 1e9) == stamp
+        assert round(float(row["time"]) * 1e9) == stamp
         mujoco.mj_setState(model, data, row["physics"], mujoco.mjtState.mjSTATE_INTEGRATION)
         mujoco.mj_kinematics(model, data)
         assert len(message.transforms) == model.nbody - 1
