@@ -108,11 +108,11 @@ class PhasePlane(Gains, ABC):
         """Return what the relays aim at, and which way each axis is turned at this instant."""
         angle, rate = turn(measurement, reference, self.axes)
         _, firing, duration = self._decide(state.memory, angle, rate)
-        vehicles = measurement.rate.shape
+        still = np.zeros_like(measurement.rate)
         aim = Aim(
-            np.broadcast_to(reference.attitude, measurement.attitude.shape),
-            np.broadcast_to(reference.rate, vehicles),
-            np.broadcast_to(reference.acceleration, vehicles),
+            np.zeros_like(measurement.attitude) + reference.attitude,
+            still + reference.rate,
+            still + reference.acceleration,
             self._on_time(firing, duration),
         )
         return state, aim, Signals(angle, rate, firing)

@@ -93,15 +93,16 @@ class Columns:
 
     def motion(self, physics: Array) -> Measurement:
         """Return the truth of what turns alone: all that motors feel."""
-        nothing = physics[..., :0]
-        return Measurement(
-            physics[..., self.attitude],
-            physics[..., self.rate],
-            physics[..., self.wheel_speed],
-            physics[..., self.gimbal_angle],
-            physics[..., self.gimbal_rate],
-            *[*[nothing] * 9, physics[..., self.wheel_angle], nothing],
-        )
+        absent = dict.fromkeys(Measurement._fields, physics[..., :0])
+        turning = {
+            "attitude": physics[..., self.attitude],
+            "rate": physics[..., self.rate],
+            "wheel_speed": physics[..., self.wheel_speed],
+            "gimbal_angle": physics[..., self.gimbal_angle],
+            "gimbal_rate": physics[..., self.gimbal_rate],
+            "wheel_angle": physics[..., self.wheel_angle],
+        }
+        return Measurement(**absent | turning)
 
 
 def _columns(indices: Any) -> Any:

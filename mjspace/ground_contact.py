@@ -158,7 +158,7 @@ def of(model: Any, struts: Any, velocity: slice) -> GroundContact | None:
         force=np.array(force, dtype=int)[:, None] + np.arange(3),
         names=tuple(s.name.removeprefix(FOOT) for s in feet),
         struts=struts,
-        stroke=np.array([leg.range[1] for leg in legs if leg.name.endswith("_strut")]),
+        stroke=np.array([leg.user[0] for leg in legs if leg.name.endswith("_strut")]),
         velocity=velocity,
     )
 

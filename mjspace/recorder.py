@@ -36,6 +36,10 @@ UNITS = {
         "momentum": "N m s",
         "energy": "J",
         "attitude_error": "rad",
+        "foot_force": "N",
+        "hull_force": "N",
+        "touchdown_velocity": "m/s",
+        "crash_velocity": "m/s",
     },
     "/measurement": {
         "rate": "rad/s",

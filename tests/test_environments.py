@@ -152,7 +152,7 @@ def fly_law(environment: Any, law: Any) -> tuple[list[np.ndarray], list[np.ndarr
         (
             "contraction-ideal",
             [
-                SHORT,
+                "duration=0.045",
                 "rates.control='5 ms'",
                 "environment.python='wind.py:wind'",
                 "environment.torques=[{bias=[1,2,3]}]",

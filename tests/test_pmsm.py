@@ -203,7 +203,7 @@ def test_a_table_takes_its_units() -> None:
     assert drives.torque_constant.tolist() == [0.4, 2.0]
     assert drives.voltage_limit.tolist() == [100.0, np.inf]
     assert drives.pole_pairs.tolist() == [6.0, 6.0]
-    with pytest.raises(ValidationError, match="'3 V' has the unit 'V': wanted ohm, mohm"):
+    with pytest.raises(ValidationError, match="'3 V' has the unit 'V', should be one of ohm, mohm"):
         TypeAdapter(Pmsm).validate_python(table.model_dump() | {"resistance": "3 V"})
 
 

@@ -46,7 +46,7 @@ def moving(step: int, members: Any = (0,)) -> Measurement:
         from_rotation_vector(0.01 * step * axis),
         np.cos(0.1 * step) * axis,
         3.0 * axis + step,
-        *[axis[:, :0]] * 13,
+        *[axis[:, :0]] * (len(Measurement._fields) - 3),
     )
 
 

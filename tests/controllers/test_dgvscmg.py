@@ -102,7 +102,10 @@ def test_a_slower_speed_loop_holds_the_currents_that_it_wants() -> None:
 
 @pytest.mark.parametrize("steps", [1, 5])
 def test_it_feeds_the_vibration_back_as_far_ahead_as_its_current_loop_lags(steps: int) -> None:
-    law = cascade(speed_steps=steps, vibration_gain=5.0, observer_gain=1.0, adaptation_gain=1.0)
+    one = np.ones(3)
+    law = cascade(
+        speed_steps=steps, vibration_gain=5.0 * one, observer_gain=one, adaptation_gain=one
+    )
     lag = 1.0 / law.current_gain + 0.5 * (steps - 1) * law.inner_period
     assert lag > 1e-4
     state, command, _, _ = flown(law, seen(1))

@@ -34,6 +34,8 @@ def laws() -> list[str]:
         for name, kind in vars(module).items():
             if not inspect.isclass(kind) or kind.__module__ != module.__name__ or name[0] == "_":
                 continue
+            if inspect.isabstract(kind):
+                continue
             if hasattr(kind, "step") and list(inspect.signature(kind.step).parameters) == STEP:
                 found.append(f"{file.name}:{name}")
     return found
