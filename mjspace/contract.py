@@ -199,6 +199,7 @@ class ReferenceSource(Protocol):
 class Gains:
     """Base of a law or a reference that refuses unfit gains however it is constructed.
 
+    Constructed in Python, a gain may have a leading axis more: one for each vehicle of a batch.
     A dataclass with a ``__post_init__`` of its own begins it with ``super().__post_init__()``.
     Without this base the gains are checked by the scenario's loader alone.
     """
@@ -209,6 +210,7 @@ class Gains:
         refuse_unfit(
             {f.name: getattr(self, f.name) for f in declared},
             {f.name: f.metadata for f in declared},
+            of_each_vehicle=True,
         )
 
 

@@ -85,8 +85,15 @@ def _not_a_number(value: Any) -> Any:
     return None if array.dtype.kind in "iuf" else (value if value is not None else "nothing")
 
 
-def refuse_unfit(gains: Mapping[str, Any], declared: Mapping[str, Mapping[str, Any]]) -> None:
+def refuse_unfit(
+    gains: Mapping[str, Any],
+    declared: Mapping[str, Mapping[str, Any]],
+    *,
+    of_each_vehicle: bool = False,
+) -> None:
     """Refuse ``gains`` that do not fit what is ``declared`` of them by ``contract.gain``.
+
+    ``of_each_vehicle`` admits a leading axis more than declared.
 
     Raises:
         ValueError: the first that does not, with its name, what was found and what would be right.
@@ -100,13 +107,16 @@ def refuse_unfit(gains: Mapping[str, Any], declared: Mapping[str, Mapping[str, A
             array = numbers(value)
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
-        _refuse_shape(name, array, metadata["shape"])
-        for size, along in zip(array.shape, metadata["shape"], strict=True):
+        extra = of_each_vehicle and array.ndim == len(metadata["shape"]) + 1
+        for one in array if extra else [array]:
+            _refuse_shape(name, one, metadata["shape"])
+            _refuse_values(name, one, metadata)
+        sized = array.shape[1:] if extra else array.shape
+        for size, along in zip(sized, metadata["shape"], strict=True):
             if isinstance(along, str):
                 other, count = sizes.setdefault(along, (name, size))
                 if size != count:
                     raise ValueError(f"{name}: {size} rows for {count} of {other}: give as many")
-        _refuse_values(name, array, metadata)
 
 
 def _refuse_shape(name: str, array: _Array, shape: tuple[int | str | None, ...]) -> None:

@@ -175,7 +175,7 @@ def test_table_converges_at_fourth_order() -> None:
         (lambda: Slew(IDENTITY, 0.0), "duration: got 0 s"),
         (lambda: Slew(IDENTITY, 1.0, 0.0, np.zeros(4)), "start_attitude: .* norm is 0"),
         (lambda: Sweep(ramp=3.0, cruise_end=2.0), "cruise_end: got 2 s,.* 3 s"),
-        (lambda: Sweep(axis=np.full(3, np.nan)), "axis.* finite"),
+        (lambda: Sweep(axis=np.full(3, np.nan)), "axis.* a number"),
         (lambda: Regulation(duration=-1.0), "duration: got -1 s"),
         (lambda: MultiAxis(np.array([0.0, 0.8, 0.0])), "pitch reach 91.7 deg"),
         (lambda: EulerSinusoids(np.array([0.0, 1.6, 0.0])), "pitch reach 91.7 deg"),
