@@ -14,6 +14,8 @@ from mjspace.plant import Vehicle
 
 DRY = 1e-6
 """kg left in a tank that is empty: a body with none would have no inertia."""
+TICK = 1e-9
+"""s: the clock's sum of steps may round."""
 FIELDS = ("thrust", "propellant", "burning", "clock")
 
 
@@ -140,7 +142,7 @@ def _engine(
     least, most, lag, flow, limit, rate_limit, position_gain, rate_gain, fails_at, strongest = data
     thrust, left, burning, clock = state
     # What is asked of an engine that is out stays unheard: it does not start twice.
-    if wanted[0] <= 0.0 or clock >= fails_at or left <= 0.0:
+    if wanted[0] <= 0.0 or clock >= fails_at - TICK or left <= 0.0:
         burning = 0.0
     target = burning * min(max(wanted[0], least), most)
     if burning == 0.0:

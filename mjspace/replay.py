@@ -121,7 +121,8 @@ def assembly_of(
     The scenario, the compiled model and the files of one's own all come from the log.
 
     Raises:
-        InputError: the log lacks one of them, or the law cannot be built.
+        InputError: the log lacks one of them, the law cannot be built, or another version packed
+            the environment into the state differently.
     """
     with blamed_on("log"):
         scenario = scenario_of(log)
@@ -131,6 +132,12 @@ def assembly_of(
         _unpack(log, Path(own))
         assembly = assemble(scenario, Path(own), law_folder=None if law is None else folder)
         model = plant.from_bytes(log.attachment("model.mjb.gz"))
+        here = assembly.vehicle.model
+        if (model.nq, model.nv, model.nuserdata) != (here.nq, here.nv, here.nuserdata):
+            raise InputError(
+                "log: its state is laid out in another way than this version of mjspace has it: fly "
+                f"it again with version {log.metadata.get('mjspace', 'that flew it')}"
+            )
         yield dataclasses.replace(assembly, vehicle=plant.on_model(assembly.vehicle, model))
 
 

@@ -25,6 +25,10 @@ def compare(before: Path, after: Path) -> str:
     fields = one["/state"].keys() ^ other["/state"].keys()
     if fields:
         return f"only one of them has {', '.join(sorted(fields))}"
+    for field in one["/state"]:
+        shapes = [rows["/state"][field].shape[1:] for rows in (one, other)]
+        if shapes[0] != shapes[1]:
+            return f"/state.{field} has the shape {shapes[0]} and {shapes[1]}"
     periods = len(one["/state"]["time"]), len(other["/state"]["time"])
     found = first_difference(*sorted((other, one), key=lambda rows: len(rows["/state"]["time"])))
     if found is not None:
