@@ -52,7 +52,7 @@ class ImmersionInvariance(Gains):
     """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
     wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
     """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", ("wheel",), above=0.0)
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
     """Axial inertia of each wheel."""
     target_gain: float = gain("1/s", default=10.0, above=0.0)
     """K: rate of the target system x_e' = -K x_e."""

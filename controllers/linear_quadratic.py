@@ -125,7 +125,7 @@ class Regulator(Gains):
     """I: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
     wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
     """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", ("wheel",), above=0.0)
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
     """Axial inertia of each wheel."""
     rate_weight: Array = gain("s^2", (3,), default=(10.0, 10.0, 10.0), at_least=0.0)
     """Of each squared rate in the cost."""

@@ -175,7 +175,7 @@ class Robust(Gains):
     """eps: what the relay may lose to smoothness."""
     wheel_axes: Array = gain(shape=("wheel", 3), default=np.zeros((0, 3)), form="unit vector")
     """Of reaction wheels, body axes: their momentum turns with the bus; ours."""
-    wheel_inertia: Array = gain("kg m^2", ("wheel",), default=(), above=0.0)
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), default=(), at_least=0.0)
     """Axial, of each, which ``inertia`` is without."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:

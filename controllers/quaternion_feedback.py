@@ -58,7 +58,7 @@ class _OnWheels(Gains, ABC):
     """Time from one step to the next."""
     wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
     """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", ("wheel",), above=0.0)
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
     """Axial inertia of each wheel."""
     rate_gain: float = gain("N m s/rad", default=6.0, above=0.0)
     """c, the same on each axis."""
