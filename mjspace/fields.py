@@ -75,7 +75,7 @@ def of_form(form: Form) -> AfterValidator:
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
-Truth = Annotated[bool, Field(strict=True)]
+Switch = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]

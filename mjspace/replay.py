@@ -135,8 +135,9 @@ def assembly_of(
         here = assembly.vehicle.model
         if (model.nq, model.nv, model.nuserdata) != (here.nq, here.nv, here.nuserdata):
             raise InputError(
-                "log: its state is laid out in another way than this version of mjspace has it: fly "
-                f"it again with version {log.metadata.get('mjspace', 'that flew it')}"
+                "log: another version of mjspace laid its state out differently: fly it again with "
+                f"version {log.metadata.get('mjspace', 'that flew it')} and the revision "
+                f"{log.metadata.get('git') or 'that it names'}"
             )
         yield dataclasses.replace(assembly, vehicle=plant.on_model(assembly.vehicle, model))
 

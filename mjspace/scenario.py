@@ -14,7 +14,7 @@ from pydantic import (
 
 from mjspace.environment_tables import Environment
 from mjspace.fault_tables import Fault
-from mjspace.fields import Count, Seconds, Table, Time, Truth
+from mjspace.fields import Count, Seconds, Switch, Table, Time
 from mjspace.quantity import any_to_si, whole_number
 from mjspace.ranges import numbers
 from mjspace.regions import Region
@@ -72,7 +72,7 @@ class Check(Watched):
     target: float | list[float] | None = None
     """Taken from the signal first, so that the statistic is of an error; numbers in SI or
     quantities."""
-    relative: Truth = False
+    relative: Switch = False
     """The error is divided by the norm of ``target``."""
     expected: Literal["PASS", "FAIL"] = "PASS"
     """How the check comes out when all is well: FAIL of what the flight shows not to hold. The

@@ -19,8 +19,8 @@ from mjspace.fields import (
     Rate3,
     Seconds,
     Si,
+    Switch,
     Table,
-    Truth,
     Unit3,
     Velocity3,
     WithinTurn,
@@ -146,7 +146,7 @@ class PlantTable(Table):
     left out."""
     ripple: dict[Name, Ripple] = {}
     """Torque ripple of motors, by the hinge."""
-    ideal_thrusters: Truth = False
+    ideal_thrusters: Switch = False
     """Whether a torque that the law asks for acts on the bus as if by thrusters, as it is: its
     command's ``torque`` or, beside motors or an engine, its ``thruster_torque``."""
     magnetorquers: Magnetorquers | None = None

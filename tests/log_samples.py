@@ -1,7 +1,7 @@
 """Small logs with every kind of content, for the tests of the log."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import prod
 from pathlib import Path
 
@@ -81,10 +81,12 @@ def rewritten(
     change: Callable[[str, int, bytes], bytes] = lambda topic, number, data: data,
     *,
     digests: bool = True,
+    attachments: Mapping[str, bytes] = {},
 ) -> Path:
     """Write the log at ``path`` anew with mcap's own writer, as another tool would; return ``out``.
 
-    ``change`` gives each message's content, by its topic and its number on it.
+    ``change`` gives each message's content, by its topic and its number on it; ``attachments``
+    take the place of those of the same name.
     """
     numbers: Counter[str] = Counter()
     with path.open("rb") as source, out.open("wb") as target:
@@ -106,9 +108,8 @@ def rewritten(
             if digests or note.name == "mjspace":
                 writer.add_metadata(note.name, note.metadata)
         for kept in reader.iter_attachments():
-            writer.add_attachment(
-                kept.create_time, kept.log_time, kept.name, kept.media_type, kept.data
-            )
+            data = attachments.get(kept.name, kept.data)
+            writer.add_attachment(kept.create_time, kept.log_time, kept.name, kept.media_type, data)
         for _, channel, message in reader.iter_messages(log_time_order=False):
             data = change(channel.topic, numbers[channel.topic], message.data)
             numbers[channel.topic] += 1

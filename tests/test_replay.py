@@ -11,11 +11,12 @@ from mjspace.assembly import assemble
 from mjspace.errors import InputError
 from mjspace.flight import Result, run
 from mjspace.flown import scenario_of
-from mjspace.loading import component
+from mjspace.loading import component, to_toml
 from mjspace.log_layout import doubles
 from mjspace.log_reader import Log
 from mjspace.plant import UnphysicalInertiaWarning
 from mjspace.replay import replay, verify
+from mjspace.scenario import Scenario
 
 pytestmark = pytest.mark.filterwarnings(
     f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
@@ -211,3 +212,13 @@ def test_a_cut_log_is_verified_as_far_as_it_goes(noisy: Result, tmp_path: Path) 
     assert not log.complete
     if len(log):
         assert verify(short) is None
+
+
+def test_a_log_whose_state_is_laid_out_otherwise_is_refused(noisy: Result, tmp_path: Path) -> None:
+    """As one of a version that packed its environment otherwise, which this one would leave out."""
+    table = scenario_of(noisy.log).model_dump(mode="python")
+    table["environment"]["torques"] = [{"bias": [1.0, 0.0, 0.0]}]
+    other = to_toml(Scenario.model_validate(table)).encode()
+    path = rewritten(noisy.path, tmp_path / "other.mcap", attachments={"scenario.toml": other})
+    with pytest.raises(InputError, match="another version of mjspace laid its state out"):
+        verify(path)
