@@ -28,6 +28,8 @@ from mjspace.user_code import (
     failure,
     read_only,
     reference_at,
+    sealed,
+    shapes_of,
 )
 
 BLOCK_PERIODS = 500
@@ -107,6 +109,7 @@ class _Flight:
         self.timed_faults = self.faults if assembly.faults_between else None
         self.inner = getattr(assembly.law, "inner", None)
         self.returned: Any = None
+        self.shapes: list[tuple[int, ...]] | None = None
         self.push = None
         if assembly.disturbance is not None:
             applied = self.batch.bind("xfrc_applied")[:, assembly.vehicle.model.body("bus").id]
@@ -196,7 +199,7 @@ class _Flight:
 
     def _measure(self, step: int, truth: Measurement) -> Measurement:
         self.sensors, measurement = self.suite.sample(self.sensors, step, truth)
-        return read_only(measurement)
+        return measurement if measurement is truth else sealed(measurement)
 
     def _ask_law(
         self, now: float, measurement: Measurement, reference: Wanted
@@ -227,8 +230,11 @@ class _Flight:
             for name, part in zip(names, returned, strict=True):
                 check_vehicle_axis(name, part, len(self.batch.state))
             self.returned = (before, *returned[1:])
-        for name, part, first in zip(names, returned, self.returned, strict=True):
-            check_same_shapes(name, part, first)
+            self.shapes = shapes_of(self.returned)
+        if shapes_of(returned) != self.shapes:
+            check_step(returned)
+            for name, part, first in zip(names, returned, self.returned, strict=True):
+                check_same_shapes(name, part, first)
 
     def _drive(
         self, now: float, command: Any, measurement: Measurement, truth: Measurement
@@ -251,10 +257,12 @@ class _Flight:
         return given, saturated
 
     def _truth(self, physics: Array) -> Measurement:
+        """Return the truth as views of ``physics``, which nobody may write to any more."""
+        physics.setflags(write=False)
         truth = self.actuators.seen(self.actuator_state, self.columns.truth(physics))
         if self.ground is not None:
             truth = self.ground.seen(self.actuator_state, truth)
-        return read_only(truth)
+        return sealed(truth)
 
     def _touch(self, tape: Tape, now: float, physics: Array) -> None:
         """Note what touches the ground at ``now``, which the derived fields describe."""

@@ -35,6 +35,14 @@ def read_only(arrays: Tuple) -> Tuple:
     return arrays
 
 
+def sealed(arrays: Tuple) -> Tuple:
+    """Return the named tuple after making its arrays read-only; views are of read-only arrays."""
+    for array in arrays:
+        if array.flags.writeable:
+            array.setflags(write=False)
+    return arrays
+
+
 def failure(who: str, error: Exception) -> FlightError:
     """Return the error that says what ``who``, code of the user's, raised, and in which line."""
     place = _place(error)
@@ -109,11 +117,22 @@ def check_vehicle_axis(name: str, arrays: Any, vehicles: int) -> None:
         FlightError: the first such field, with its shape.
     """
     for field, shape in _by_name(arrays).items():
+        if not isinstance(getattr(arrays, field), np.ndarray):
+            raise FlightError(f"the law's {name}.{field} must be an array, of a batched law")
         if not shape or shape[0] != vehicles:
             raise FlightError(
                 f"the law's {name}.{field} has the shape {shape}: of a batched law it must begin "
                 f"with the vehicle axis, ({vehicles}, ...)"
             )
+
+
+def shapes_of(returned: Any) -> list[tuple[int, ...]] | None:
+    """Return the shapes of all arrays in (state, command, signals); None where it is not that."""
+    try:
+        state, command, signals = returned
+        return [array.shape for part in (state, command, signals) for array in part or ()]
+    except (AttributeError, TypeError, ValueError):
+        return None
 
 
 def check_same_shapes(name: str, arrays: Any, first: Any) -> None:
@@ -122,17 +141,15 @@ def check_same_shapes(name: str, arrays: Any, first: Any) -> None:
     Raises:
         FlightError: with the fields or the shapes that differ.
     """
-    shapes = [getattr(array, "shape", ()) for array in arrays or ()]
-    if shapes == [getattr(array, "shape", ()) for array in first or ()]:
-        return
     now, before = _by_name(arrays), _by_name(first)
     if now.keys() != before.keys():
         raise FlightError(f"the law's {name} has the fields {list(now)} after {list(before)}")
-    changed = next(field for field in now if now[field] != before[field])
-    raise FlightError(
-        f"the law's {name}.{changed} has the shape {now[changed]} after {before[changed]}: shapes "
-        "must not change"
-    )
+    for field, shape in now.items():
+        if shape != before[field]:
+            raise FlightError(
+                f"the law's {name}.{field} has the shape {shape} after {before[field]}: shapes "
+                "must not change"
+            )
 
 
 def _by_name(arrays: Any) -> dict[str, tuple[int, ...]]:

@@ -215,6 +215,8 @@ def test_a_copy_may_be_changed_and_the_truth_stays(tmp_path: Path) -> None:
         ("return None, self.zero(m), Seen('x')", "the law's signals.e is not an array of numbers"),
         ("return None, self.zero(m), Seen(np.zeros(3 if t < 0.2 else 4))",
          r"t = 0\.2 s: the law's signals\.e has the shape \(1, 4\) after \(1, 3\)"),
+        ("return (None, self.zero(m), None) if t < 0.2 else None", r"t = 0\.2 s: .*returned None"),
+        ("return None, self.zero(m), None if t < 0.2 else {'e': 1}", r"t = 0\.2 s: .* a dict\)"),
         ("return None if t < 0.2 else Seen(1.0), self.zero(m), None",
          r"t = 0\.2 s: the law's state has the fields \['e'\] after \[\]"),
     ],
@@ -238,6 +240,17 @@ def test_a_wrong_first_state_is_named(tmp_path: Path, reset: str) -> None:
     for batched in ("true", "false"):
         with pytest.raises(FlightError, match=r"law's reset returned .*: it must return its"):
             flown(tmp_path, law(GOOD, reset), f"law.batched={batched}")
+
+
+@pytest.mark.parametrize(
+    "later", ["None", "(None, self.zero(m))", "(None, self.zero(m), {'e': 1})", "(None, 1.0, None)"]
+)
+def test_a_batched_law_that_returns_something_else_later_is_named(
+    tmp_path: Path, later: str
+) -> None:
+    code = law(f"return (None, self.zero(m), None) if t < 0.2 else {later}")
+    with pytest.raises(FlightError, match=r"t = 0\.2 s: the law's step returned"):
+        flown(tmp_path, code, "law.batched=true")
 
 
 def test_a_batched_law_without_a_vehicle_axis_is_named(tmp_path: Path) -> None:
