@@ -86,7 +86,7 @@ def rewritten(
     """Write the log at ``path`` anew with mcap's own writer, as another tool would; return ``out``.
 
     ``change`` gives each message's content, by its topic and its number on it; ``attachments``
-    take the place of those of the same name.
+    take the place of those of the same name, or are added.
     """
     numbers: Counter[str] = Counter()
     with path.open("rb") as source, out.open("wb") as target:
@@ -110,6 +110,8 @@ def rewritten(
         for kept in reader.iter_attachments():
             data = attachments.get(kept.name, kept.data)
             writer.add_attachment(kept.create_time, kept.log_time, kept.name, kept.media_type, data)
+        for name in attachments.keys() - {kept.name for kept in reader.iter_attachments()}:
+            writer.add_attachment(0, 0, name, "text/plain", attachments[name])
         for _, channel, message in reader.iter_messages(log_time_order=False):
             data = change(channel.topic, numbers[channel.topic], message.data)
             numbers[channel.topic] += 1

@@ -143,8 +143,11 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 
 @pytest.mark.parametrize("topic", ["/state", "/truth", "/measurement", "/command", "/law"])
-def test_one_bit_of_any_field_is_named(everything: Result, tmp_path: Path, topic: str) -> None:
+def test_one_bit_of_any_field_is_named(
+    everything: Result, tmp_path: Path, topic: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The digests name the topic; without them, the flight again names field and time."""
+    monkeypatch.setattr("mjspace.simulation.BLOCK_PERIODS", 7)  # and not in the first block alone
     log = everything.log
     for field in log.topics[topic]:
         path = changed_log(log, tmp_path / "one.mcap", topic, field, 30, digests=False)
@@ -222,3 +225,28 @@ def test_a_log_whose_state_is_laid_out_otherwise_is_refused(noisy: Result, tmp_p
     path = rewritten(noisy.path, tmp_path / "other.mcap", attachments={"scenario.toml": other})
     with pytest.raises(InputError, match="another version of mjspace laid its state out"):
         verify(path)
+
+
+def test_an_attachment_stays_in_its_folder(noisy: Result, tmp_path: Path) -> None:
+    inside = rewritten(noisy.path, tmp_path / "in.mcap", attachments={"law/beside.py": b""})
+    assert verify(inside) is None
+    outside = rewritten(noisy.path, tmp_path / "out.mcap", attachments={"law/../../up.py": b""})
+    with pytest.raises(InputError, match=r"the attachment 'law/\.\./\.\./up\.py' leads out"):
+        verify(outside)
+
+
+def test_under_another_law_what_looks_at_the_law_is_left_out(noisy: Result, tmp_path: Path) -> None:
+    """Checks of the law's signals, and those that count from events of them; no other."""
+    table = scenario_of(noisy.log).model_dump(mode="python")
+    events = [{"name": "slow", "signal": "law.error", "below": 1.0}]
+    events += [{"name": "turning", "signal": "truth.rate", "above": 0.01}]
+    rate = {"signal": "truth.rate", "below": 1e3}
+    checks = [{"name": "law", "signal": "law.error", "below": 1e9}]
+    checks += [{"name": "after slow", "since": "slow", **rate}]
+    checks += [{"name": "after turning", "since": "turning", **rate}, {"name": "always", **rate}]
+    table |= {"events": events, "checks": checks}
+    other = to_toml(Scenario.model_validate(table)).encode()
+    path = rewritten(noisy.path, tmp_path / "other.mcap", attachments={"scenario.toml": other})
+    (tmp_path / "damper.py").write_text(DAMPER)
+    result = replay(path, tmp_path / "out", law=component("damper.py:Damper", []), folder=tmp_path)
+    assert [verdict.check.name for verdict in result.verdicts] == ["after turning", "always"]
