@@ -56,18 +56,21 @@ GUARDS = {
     "mjspace/log_writer.py": LOG,
     "mjspace/recorder.py": ("test_recorder.py",),
     "mjspace/tape.py": ("test_tape.py", "test_blocks.py", "test_recorder.py", "test_crossings.py"),
-    "mjspace/replay.py": ("test_replay.py", "test_api.py"),
+    "mjspace/replay.py": ("test_replay.py", "test_api.py", "test_user_files.py"),
     "mjspace/checks.py": ("test_checks.py", "test_verdict.py"),
     "mjspace/flight.py": ("test_verdict.py", "test_flight.py", "test_recorder.py"),
     "mjspace/faults.py": ("test_faults.py", "test_blocks.py"),
     "mjspace/noise.py": ("test_sensors.py",),
     "mjspace/sensors.py": ("test_sensors.py",),
-    "mjspace/strapdown.py": ("test_sensors.py", "controllers/test_lander_estimator.py"),
+    "mjspace/strapdown.py": ("test_strapdown.py",),
     "mjspace/validation/results.py": VALIDATION,
     "mjspace/validation/suite.py": VALIDATION,
     "mjspace/validation/table.py": VALIDATION,
     "mjspace/validation/meter.py": ("validation/test_stand.py", "validation/test_floating_arm.py"),
-    "controllers/guidance.py": ("controllers/test_lander_guidance.py",),
+    "controllers/guidance.py": (
+        "controllers/test_descent_plan.py",
+        "controllers/test_lander_guidance.py",
+    ),
 }
 """The modules that carry trust, each with the test files that guard it."""
 
