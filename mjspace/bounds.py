@@ -8,6 +8,7 @@ from mjspace.log_reader import Log
 from mjspace.panels import Panel
 from mjspace.scenario import Check
 
+_NARROW = 0.3  # of the upper bound
 _SHORTEST = 0.05  # of the log: a bound on one instant, drawn so that it is seen
 
 
@@ -51,11 +52,22 @@ def bounds(panel: Panel, checks: Sequence[Check], log: Log) -> Iterator[Bound]:
         end = log.end if check.end is None else min(check.end, log.end)
         start = end if check.statistic == "final" else min(check.start, end)
         start = min(start, end - _SHORTEST * (log.end - log.start))
-        for sign, limit in (("<", check.below), (">", check.above)):
-            if limit is None:
-                continue
-            value = panel.scale * limit
-            text = f"{check.statistic} {sign} {value:.4g}"
-            yield Bound(text, value, start, end, sign == "<", component)
+        for text, limit, upper in _limits(check, panel.scale):
+            yield Bound(text, limit, start, end, upper, component)
             if check.statistic == "peak":
-                yield Bound(text, -value, start, end, sign == ">", component)
+                yield Bound(text, -limit, start, end, not upper, component)
+
+
+def _limits(check: Check, scale: float) -> Iterator[tuple[str, float, bool]]:
+    """Yield the check's bounds: text, value in the panel's unit, and whether it is an upper one.
+
+    Two that are too near each other for two texts have one.
+    """
+    below, above = check.below, check.above
+    if below is not None and above is not None and below - above < _NARROW * abs(below):
+        yield f"{check.statistic} {scale * above:.4g} to {scale * below:.4g}", scale * below, True
+        yield "", scale * above, False
+        return
+    for sign, limit in (("<", below), (">", above)):
+        if limit is not None:
+            yield f"{check.statistic} {sign} {scale * limit:.4g}", scale * limit, sign == "<"

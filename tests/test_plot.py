@@ -157,6 +157,7 @@ CHECKS = [
     Check(name="d", signal="truth.rate", below=1.0),
     Check(name="e", signal="truth.momentum", statistic="drift", above=0.001),
     Check(name="f", signal="truth.momentum", below=0.002),
+    Check(name="h", signal="truth.energy", statistic="peak", above=9.0, below=10.0),
     Check(name="g", signal="truth.attitude_error", below=0.1, target=1.0),
 ]
 DEG = 180.0 / np.pi
@@ -180,6 +181,15 @@ DEG = 180.0 / np.pi
             ],
         ),
         (MOMENTUM, [Bound("drift > 0.001", 0.001, 0.0, 1.0, False, 0)]),
+        (
+            Panel("energy", "/truth", "energy"),
+            [
+                Bound("peak 9 to 10", 10.0, 0.0, 1.0, True, 0),
+                Bound("peak 9 to 10", -10.0, 0.0, 1.0, False, 0),
+                Bound("", 9.0, 0.0, 1.0, False, 0),
+                Bound("", -9.0, 0.0, 1.0, True, 0),
+            ],
+        ),
         (SPEED, []),
         (Panel("one", "/truth", "rate", part=slice(1, 2)), []),
     ],
