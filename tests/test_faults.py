@@ -11,7 +11,7 @@ from mjspace.assembly import assemble
 from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.fault_tables import Fault
-from mjspace.faults import STREAM, FaultSet
+from mjspace.faults import STREAM, FaultSet, between
 from mjspace.flight import run
 from mjspace.loading import load
 from mjspace.noise import normals
@@ -65,6 +65,36 @@ def test_a_motor_gives_what_its_fault_says(kind: str, value: Any, wanted: Any) -
         (0.4, 0, "WARNING", f"fault: wheel_1 is {kind}"),
         (0.8, 0, "INFO", f"fault: wheel_1 is {kind} no more"),
     ]
+
+
+def test_the_phase_in_the_log_is_0_before_1_while_it_lasts_and_2_after() -> None:
+    wheels = [ReactionWheels(np.eye(3))]
+    table = Fault.model_validate({"motor": "wheel_1", "kind": "dead", "at": 0.1, "until": 0.3})
+    faults = FaultSet([table], wheels, MOTORS, HOLD, seed=3, members=[0])
+    state, phases = faults.reset(), []
+    for k in range(5):
+        state, _ = faults.decide(state, k * HOLD, {})
+        phases.append(float(state["fault_phase"][0, 0]))
+    assert phases == [0.0, 1.0, 1.0, 2.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("times", "falls_between"),
+    [
+        ([{"at": 0.2}], False),
+        ([{"at": 0.25}], True),
+        ([{"at": 0.2, "until": 0.4}], False),
+        ([{"at": 0.2, "until": 0.35}], True),
+        ([{"at": 0.2}, {"at": 0.31}], True),
+        ([{"at": 0.0}, {"at": 0.3}], False),
+        ([{"when": {"signal": "truth.rate", "above": 1.0}}], False),
+    ],
+)
+def test_which_faults_begin_or_end_between_control_instants(
+    times: list[dict[str, Any]], falls_between: bool
+) -> None:
+    tables = [Fault.model_validate({"motor": "wheel_1", "kind": "dead", **t}) for t in times]
+    assert between(tables, 0.1) is falls_between
 
 
 def test_noise_is_of_that_size_and_a_members_own() -> None:
