@@ -271,7 +271,9 @@ class Watch:
         """Return the tests that reach each line, the fastest first; under 0, all of them."""
         order = sorted(self.seconds, key=lambda test: self.seconds[test])
         reached = {n: [t for t in order if n in self.lines.get(t, ())] for n in self._all_lines()}
-        return {0: order} | {n: order if n in self.lines[""] else t for n, t in reached.items()}
+        # Of a constant over several lines only one is traced: the others are reached by all.
+        everywhere = {n for n, tests in reached.items() if n in self.lines[""] or not tests}
+        return {0: order} | {n: order if n in everywhere else t for n, t in reached.items()}
 
     def _all_lines(self) -> set[int]:
         return set().union(*self.lines.values())
