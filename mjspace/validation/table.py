@@ -113,7 +113,7 @@ def _table(*columns: str) -> Table:
             style = "yellow" if name in wording.OTHERS else ""
             table.add_column(name, justify="right", no_wrap=True, style=style)
         elif name == "why that bound":
-            table.add_column(name, style="dim", ratio=1)
+            table.add_column(name, style="dim")
         else:
             table.add_column(name, no_wrap=name == "benchmark")
     return table

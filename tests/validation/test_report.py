@@ -1,5 +1,6 @@
 """The report: one HTML file that needs nothing else, Markdown with figures, a table that fits."""
 
+import re
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from mjspace.validation import figures, report, table
 from mjspace.validation.benchmark import Bound
 from mjspace.validation.benchmarks import ALL
+from mjspace.validation.passport import Finding, Passport
 from mjspace.validation.results import Injected, Line, Results, Row, Section
 
 TIME = [0.0, 1.0, 2.0]
@@ -137,3 +139,194 @@ def test_the_table_says_what_failed(capsys: pytest.CaptureFixture[str]) -> None:
     assert "FAIL" in lost
     assert any("spin did not notice: the other way" in line for line in lines)
     assert any("Not <compared>." in line for line in lines)
+
+
+def shown(capsys: pytest.CaptureFixture[str], results: Results = RESULTS) -> list[str]:
+    table.show(results)
+    return capsys.readouterr().out.splitlines()
+
+
+def cells(lines: list[str], head: str) -> dict[str, dict[str, str]]:
+    """Return the rows of the table whose first column is ``head``: by their first cell, by column.
+
+    Columns are two blanks apart, and no cell of these has two blanks in it.
+    """
+    begin = next(k for k, line in enumerate(lines) if line.startswith(head))
+    starts = [0, *(m.end() for m in re.finditer("  +", lines[begin].rstrip()))]
+    spans = [slice(a, b) for a, b in zip(starts, [*starts[1:], None], strict=True)]
+    rows = {}
+    for line in lines[begin + 1 :]:
+        first, *others = (line[span].strip() for span in spans)
+        names = (lines[begin][span].strip() for span in spans[1:])
+        rows[first] = dict(zip(names, others, strict=True))
+    return rows
+
+
+def test_the_table_says_who_caught_which_fault(capsys: pytest.CaptureFixture[str]) -> None:
+    """And who missed one, which is not said of a fault that a benchmark does not claim to catch."""
+    more = Injected(fault="armature", meaning="heavy", wanted=False, broken=["angle"])
+    other = SECTION.model_copy(update={"name": "other", "faults": [more]})
+    none = SECTION.model_copy(update={"name": "none", "faults": []})
+    lines = shown(capsys, RESULTS.model_copy(update={"sections": [SECTION, other, none]}))
+    assert lines[-2:] == ["FAIL spin did not notice: the other way", "Not <compared>."]
+    assert cells(lines[:-2], "caught faults") == {
+        "spin": {
+            **dict.fromkeys(("armature", "integrator", "erratum"), ""),
+            **{"inertia": "caught", "held": "-", "sign": "MISSED"},
+        },
+        "other": {
+            **dict.fromkeys(("sign", "integrator", "held", "erratum", "inertia"), ""),
+            "armature": "caught",
+        },
+    }
+    head = next(k for k, line in enumerate(lines) if line.startswith("caught faults"))
+    assert lines[head - 1] == ""
+
+
+def test_a_quick_table_has_no_faults_and_no_other_integrators(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert "Euler" in shown(capsys)[0]
+    quick = shown(capsys, RESULTS.model_copy(update={"quick": True}))
+    assert not any("Euler" in line or "caught faults" in line for line in quick)
+
+
+def test_a_benchmark_is_named_once_and_each_quantity_has_its_verdict(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    other = SECTION.model_copy(update={"name": "other"})
+    lines = shown(capsys, RESULTS.model_copy(update={"sections": [SECTION, other]}))
+    rows = [line.split() for line in lines[1:7]]
+    assert [row[0] for row in rows] == ["spin", "period", "lost", "other", "period", "lost"]
+    verdicts = [[word for word in row if word in ("PASS", "FAIL")] for row in rows]
+    assert verdicts == [["PASS"], ["FAIL"], ["FAIL"]] * 2
+
+
+def test_brackets_are_no_markup(capsys: pytest.CaptureFixture[str]) -> None:
+    """Rich takes what is in brackets for a style, and shows none of it."""
+    row = Row.judged(Bound("rate [red]", "", 1.0, "by [bold]"), 0.5)
+    fault = Injected(fault="sign", meaning="[dim]", wanted=True, broken=[])
+    section = SECTION.model_copy(update={"rows": [row], "faults": [fault]})
+    text = "\n".join(
+        shown(capsys, RESULTS.model_copy(update={"sections": [section], "remarks": ["see [b]"]}))
+    )
+    for part in ("rate [red]", "by [bold]", "did not notice: [dim]", "see [b]"):
+        assert part in text
+
+
+def terminal(monkeypatch: pytest.MonkeyPatch, columns: int) -> None:
+    """Have the output taken for a terminal of that width, with colors."""
+    for name, value in {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": str(columns)}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+
+
+@pytest.mark.parametrize(("columns", "reasons"), [(100, False), (149, False), (150, True)])
+def test_reasons_are_for_a_wide_terminal(
+    columns: int,
+    reasons: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A file, which has no width, gets them too."""
+    assert "why that bound" in shown(capsys)[0]
+    terminal(monkeypatch, columns)
+    lines = shown(capsys)
+    assert ("why that bound" in lines[0]) is reasons
+    assert any("as a | b" in line for line in lines) is reasons
+    assert max(len(plain(line)) for line in lines) <= columns
+
+
+def plain(line: str) -> str:
+    return re.sub("\x1b[^m]*m", "", line)
+
+
+def test_a_narrow_terminal_breaks_words_and_not_numbers(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    long = Bound("angle between the axis and its momentum", "rad", 1e-9, "because")
+    rows = [Row.judged(long, -1.25e-12, {"Euler": 0.0123})]
+    section = SECTION.model_copy(update={"name": "a-long-name", "rows": rows, "faults": []})
+    terminal(monkeypatch, 85)
+    lines = [
+        plain(line) for line in shown(capsys, RESULTS.model_copy(update={"sections": [section]}))
+    ]
+    first = lines[1]
+    for whole in ("a-long-name", "-1.2e-12", "0.012"):
+        assert whole in first
+    assert "momentum" in "".join(lines[2:])
+    # Numbers stand below one another by their last digits, under the head.
+    for head, number in (("measured", "-1.2e-12"), ("Euler", "0.012")):
+        assert lines[0].index(head) + len(head) == first.index(number) + len(number)
+
+
+YELLOW, DIM = "\x1b[33m", "\x1b[2m"
+
+
+def test_only_what_is_judged_stands_out(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Other integrators are a warning, reasons are dim, and no number in a sentence is colored."""
+    terminal(monkeypatch, 160)
+    fault = Injected(fault="sign", meaning="by 3 rad", wanted=True, broken=[])
+    section = SECTION.model_copy(update={"faults": [fault]})
+    update = {"sections": [section], "remarks": ["of 3 rad"]}
+    lines = shown(capsys, RESULTS.model_copy(update=update))
+    angle = lines[1]
+    assert re.search(rf"{re.escape(YELLOW)} *0\.02", angle)
+    assert re.search(rf"{re.escape(DIM)}as a \| b", angle)
+    assert not re.search(r"\x1b[^m]*m *2e-12", angle)
+    assert "of 3 rad" in lines
+    (missed,) = (line for line in lines if "did not notice" in line)
+    assert missed.endswith(" spin did not notice: by 3 rad")
+
+
+ROWS = [
+    Row.judged(Bound("energy", "", 1e-6, "keeps [it]"), 2.5e-7),
+    Row.judged(Bound("momentum", "", 1e-9, "is kept"), 1.0),
+]
+PASSPORT = Passport(
+    model="here/[x].xml",
+    integrator="RK4",
+    step=0.01,
+    findings=[
+        Finding(refused=True, text="automatic [reset] is on 1"),
+        Finding(refused=False, text="heavy"),
+    ],
+    rows=ROWS,
+    advice=["take [a] step of 0.02 s"],
+    unjudged=["what rests on [y] 2"],
+)
+
+
+def test_a_passport_is_shown_whole(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table.show_passport(PASSPORT)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:3] == [
+        "here/[x].xml: RK4, step 0.01 s",
+        "refused: automatic [reset] is on 1",
+        "warning: heavy",
+    ]
+    assert cells(lines[3:6], "quantity") == {
+        "energy": {
+            "measured": "2.5e-07",
+            "allowed": "1e-06",
+            "verdict": "PASS",
+            "why that bound": "keeps [it]",
+        },
+        "momentum": {
+            "measured": "1",
+            "allowed": "1e-09",
+            "verdict": "FAIL",
+            "why that bound": "is kept",
+        },
+    }
+    assert lines[6:] == ["not judged: what rests on [y] 2", "take [a] step of 0.02 s"]
+    # What is long stays on one line, to be searched for and copied; its numbers are not colored.
+    terminal(monkeypatch, 30)
+    table.show_passport(PASSPORT)
+    narrow = capsys.readouterr().out.splitlines()
+    assert lines[0] in narrow
+    assert any(line.endswith("m: what rests on [y] 2") for line in narrow)

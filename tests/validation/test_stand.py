@@ -103,6 +103,68 @@ def test_the_meter_agrees_with_mujoco() -> None:
         assert meter.kinetic_energy(record)[row] == pytest.approx(data.energy[1], rel=1e-12)
 
 
+TWO_AND_A_STAND = """
+<mujoco>
+  <option gravity="0 0 -10"/>
+  <worldbody>
+    <body pos="0 0 50"><inertial pos="0 0 0" mass="100" diaginertia="1 1 1"/></body>
+    <body><freejoint/><inertial pos="0 0.5 0" mass="1" diaginertia="0.3 0.4 0.5"/></body>
+    <body><freejoint/><inertial pos="0 0 0" mass="3" diaginertia="2 1 1.5"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_what_flies_apart_counts_and_what_stands_does_not() -> None:
+    """Two bodies, the first with its centre of mass beside its origin; the sums are by hand."""
+    model = mujoco.MjModel.from_xml_string(TWO_AND_A_STAND)
+    qpos = np.array([[1.0, -0.5, 0, 1, 0, 0, 0, -1.0, 0, 0, 1, 0, 0, 0]])
+    # The first turns about x, so that its centre of mass moves by 4 * 0.5 along z too.
+    qvel = np.array([[0, 2.0, 0, 4.0, 0, 0, 0, 0, -1.0, 0, 3.0, 0]])
+    record = stand.Record(model, np.zeros(1), qpos, qvel)
+    np.testing.assert_allclose(meter.centre_of_mass(record), [[-0.5, 0, 0]], atol=1e-15)
+    # 1 kg at (0, 2, 2) m/s and 3 kg at (0, 0, -1) m/s
+    np.testing.assert_allclose(meter.linear_momentum(record), [[0, 2, -1]], atol=1e-15)
+    # 3/4 kg of reduced mass, 2 m apart along x, at (0, 2, 3) m/s; and the spins
+    spins = [0.3 * 4.0, 1.0 * 3.0, 0.0]
+    np.testing.assert_allclose(
+        meter.angular_momentum(record), [np.add([0, -4.5, 3], spins)], rtol=1e-15
+    )
+    turning = 0.5 * (0.3 * 16.0 + 1.0 * 9.0)
+    assert meter.kinetic_energy(record) == pytest.approx([0.5 * 8.0 + 0.5 * 3.0 + turning])
+
+
+SPRINGS = """
+<mujoco>
+  <option gravity="0 0 -10"/>
+  <worldbody>
+    <body>
+      <joint name="slide" type="slide" axis="0 0 1" stiffness="8"/>
+      <inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+    </body>
+  </worldbody>
+  <tendon><fixed stiffness="6" springlength="0.5"><joint joint="slide" coef="1"/></fixed></tendon>
+</mujoco>
+"""
+
+
+def test_potential_energy_is_of_height_joints_and_tendons() -> None:
+    model = mujoco.MjModel.from_xml_string(SPRINGS)
+    height = np.array([0.0, 1.0, -0.5])
+    record = stand.Record(model, np.arange(3.0), height[:, None], np.ones((3, 1)))
+    energy = 2.0 * 10.0 * height + 0.5 * 8.0 * height**2 + 0.5 * 6.0 * (height - 0.5) ** 2
+    np.testing.assert_allclose(meter.potential_energy(record), energy, rtol=1e-15)
+
+
+def test_drift_is_the_largest_departure_from_the_first_row() -> None:
+    vectors = np.array([[3.0, 4.0], [3.0, 4.5], [0.0, 0.0], [3.0, 3.0]])
+    assert meter.drift(vectors) == pytest.approx(1.0, rel=1e-15)  # 5 of 5
+    assert meter.drift(vectors[:2]) == pytest.approx(0.1, rel=1e-15)
+    assert meter.drift(vectors, scale=2.0) == pytest.approx(2.5, rel=1e-15)
+    assert meter.drift(np.array([-4.0, -4.0, -3.0])) == 0.25  # of a scalar
+    assert meter.drift(vectors[:1]) == 0.0
+
+
 def test_phases_join_to_one_record() -> None:
     model = stand.build(STEP, "tumbler")
     data = stand.start(model)

@@ -1,10 +1,12 @@
 """The suite's judgement: what passes, what must fail, and that the same comes out every time."""
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from mjspace.validation import suite
 from mjspace.validation.benchmark import (
@@ -18,7 +20,7 @@ from mjspace.validation.benchmark import (
     Readings,
 )
 from mjspace.validation.benchmarks import ALL
-from mjspace.validation.results import Injected, Results
+from mjspace.validation.results import Injected, Line, Results, Row
 
 TIME = np.linspace(0.0, 1.0, 3)
 
@@ -177,6 +179,40 @@ def test_the_plan_is_flown_as_it_should_be() -> None:
     assert told == pytest.approx(np.arange(1, len(flown) + 1) / len(flown))
 
 
+def test_what_is_long_is_flown_before_what_is_short() -> None:
+    """Of all benchmarks, not of each: a long flight begun last would keep everything waiting."""
+    planned: list[Conditions] = []
+
+    def noting(flights: Sequence[suite.Flight]) -> Iterator[tuple[suite.Flight, Readings]]:
+        planned.extend(conditions for _, conditions in flights)
+        yield from here(flights)
+
+    suite.validate([FAKE, replace(FAKE, name="other")], fly_all=noting)
+    assert [c.short for c in planned] == sorted(c.short for c in planned)
+    assert [c.short for c in planned].count(False) == 4
+
+
+@pytest.mark.parametrize(
+    ("order", "passed"), [(3.0, False), (3.92, True), (4.08, True), (4.5, False), (5.0, False)]
+)
+def test_an_order_may_be_off_by_what_coarse_steps_do_to_it(order: float, passed: bool) -> None:
+    """Between rounding and the limit of stability RK4 is seen within a tenth of four."""
+
+    def fly(conditions: Conditions) -> Readings:
+        return readings(1e-3 * conditions.step**order, 0.25)
+
+    row = validated(fly).sections[0].rows[-1]
+    assert row.measured == pytest.approx(order, rel=1e-12)
+    assert row.passed is passed
+
+
+def test_errors_above_one_have_an_order_as_well() -> None:
+    def fly(conditions: Conditions) -> Readings:
+        return readings(1e3 * conditions.step**4, 0.25)
+
+    assert validated(fly).sections[0].rows[-1].measured == pytest.approx(4.0, rel=1e-12)
+
+
 def test_a_wrong_order_fails() -> None:
     (section,) = validated(second_order).sections
     row = section.rows[-1]
@@ -205,6 +241,34 @@ def test_results_survive_json() -> None:
     assert np.isnan(again.sections[0].rows[0].measured)
     assert again.model_dump_json() == results.model_dump_json()
     assert not again.passed
+
+
+def test_what_the_results_say_of_themselves_is_written_and_never_believed() -> None:
+    results = validated(fourth_order)
+    told = json.loads(results.model_dump_json())
+    assert told["passed"] is told["sections"][0]["passed"] is True
+    assert [fault["caught"] for fault in told["sections"][0]["faults"]] == [True, *[False] * 3]
+    told["sections"][0]["faults"][0]["broken"] = []
+    again = Results.model_validate(told)
+    assert not again.passed
+    assert again.sections[0].missed[0].caught is False
+
+
+def test_results_do_not_change() -> None:
+    row = Row.judged(Bound("error", "rad", 1.0, "because"), 2.0)
+    with pytest.raises(ValidationError, match="frozen"):
+        row.passed = True  # type: ignore[misc]
+    assert not row.passed
+
+
+def test_a_curve_is_kept_with_six_digits_and_as_what_it_is() -> None:
+    third = np.array([1.0 / 3.0, 2e7 / 3.0])
+    for dots in (False, True):
+        kept = Line.of(Curve("w", third, -third, dots))
+        assert kept == Line(
+            label="w", x=[0.333333, 6666670.0], y=[-0.333333, -6666670.0], dots=dots
+        )
+    assert not Line(label="w", x=[0.0], y=[0.0]).dots, "a line where nothing is said"
 
 
 def test_only_what_is_named_is_chosen() -> None:
