@@ -53,7 +53,7 @@ def until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:
     first, culprit = len(block.time), ""
     for name, values in acting.items():
         # Also false for what is not a number.
-        good = (np.abs(values) < mujoco.mjMAXVAL).reshape(len(values), -1).all(axis=1)
+        good = (np.abs(values) <= mujoco.mjMAXVAL).reshape(len(values), -1).all(axis=1)
         if not good.all() and int(np.argmin(good)) < first:
             first, culprit = int(np.argmin(good)), name
     if not culprit:

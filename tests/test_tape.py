@@ -1,5 +1,6 @@
 """What is derived from a flight's state: numbers of /truth at a known state, and good blocks."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from mjspace.assembly import assemble
 from mjspace.attitude import from_euler_zyx, rotate
 from mjspace.contract import Array
+from mjspace.errors import FlightError
 from mjspace.loading import load
 from mjspace.simulation import fly
 from mjspace.start import first_start
@@ -76,6 +78,20 @@ def test_tilt_and_distance_of_a_lander(euler: list[float]) -> None:
     np.testing.assert_array_equal(truth["position_error"], np.subtract([2001, 1498, 1007], wanted))
     np.testing.assert_array_equal(row["/reference"]["position"], wanted)
     np.testing.assert_array_equal(row["/state"]["actuator_propellant"], truth["propellant"])
+    # nothing touches the ground half a kilometre below
+    np.testing.assert_array_equal(truth["touchdown_velocity"], [-15, -20, -10])
+    for name in ("crash", "contact", "hull_force", *4 * ["foot_force"]):
+        assert not truth[name].any(), name
+
+
+def test_a_lander_on_its_head_is_tilted_by_half_a_turn() -> None:
+    """Of this quaternion, one to the last bit, the part that leans is rounded to more than one."""
+    leaning = np.array([0.0, 0.8686042843234141, 0.49550640485770714, 0.0])
+    assert np.sqrt(np.square(leaning).sum()) > 1.0
+    built = assemble(*load("lander", ["duration=0.02", "checks=[]", "events=[]"]))
+    turned = replace(built, qpos=np.concatenate([built.qpos[:3], leaning, built.qpos[7:]]))
+    block = next(iter(fly(turned, first_start(turned, [0]))))
+    assert block.rows["/truth"]["tilt"][0, 0] == np.pi
 
 
 GOOD = np.arange(12.0).reshape(4, 1, 3)
@@ -126,6 +142,15 @@ def test_the_first_trouble_is_the_one_that_is_named() -> None:
     assert at_once.events == []
 
 
+def test_the_largest_number_that_mujoco_takes_can_be_flown() -> None:
+    """Its manual, of ``mju_isBad``: bad is what is above ``mjMAXVAL``, 1e10."""
+    for sign in (-1.0, 1.0):
+        largest = block(torque=spoiled(1, 0, sign * 1e10))
+        assert until_trouble(largest, COLUMNS) == (largest, "")
+        beyond = block(torque=spoiled(1, 0, sign * np.nextafter(1e10, np.inf)))
+        assert len(until_trouble(beyond, COLUMNS)[0].time) == 1
+
+
 @pytest.mark.parametrize(
     "fine", [{}, {"law": spoiled(1, 0, np.inf)}, {"physics": spoiled(1, 2, np.inf)}]
 )
@@ -140,6 +165,29 @@ def test_a_block_is_seen_as_one_vehicles() -> None:
     np.testing.assert_array_equal(one_vehicle(both)["/truth"]["rate"], two[:, 0])
     np.testing.assert_array_equal(one_vehicle(both, 1)["/truth"]["rate"], two[:, 1])
     assert shapes(both) == {"/truth": {"rate": (3,)}}
+
+
+def test_what_happens_in_a_period_that_is_not_recorded_is_not_told(tmp_path: Any) -> None:
+    """The disturbance fails after the faults of 0.01 s began: the log ends before them."""
+    (tmp_path / "push.py").write_text(
+        "def push(time, truth):\n    return 2 * [[0, 0, 1 / (time < 0.0099)]]\n"
+    )
+    (tmp_path / "x.toml").write_text(
+        'base = "detumble-wheels"\n[environment]\npython = "push.py:push"\n'
+    )
+    faults = ", ".join(
+        f"{{motor='wheel_{wheel}', kind='noisy', value=0.1, at={at}}}"
+        for wheel, at in enumerate((0.0, 0.005, 0.01))
+    )
+    built = assemble(*load(str(tmp_path / "x.toml"), ["duration=1", f"faults=[{faults}]"]))
+    flight = fly(built, first_start(built, [0]))
+    block = next(flight)
+    np.testing.assert_array_equal(block.time, [0.0, 0.005])
+    assert [event[0] for event in block.events] == [0.0, 0.005]
+    for wheel, (*_, message) in enumerate(block.events):
+        assert f"wheel_{wheel} is noisy" in message
+    with pytest.raises(FlightError, match=r"stopped at t = 0\.01 s.*ZeroDivisionError"):
+        next(flight)
 
 
 def test_a_disturbance_of_ones_own_adds_to_the_environment(tmp_path: Any) -> None:
