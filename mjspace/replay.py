@@ -188,7 +188,7 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
         seen = log.read("/measurement", None, *near)
         wanted = reference_at(assembly.reference, np.array([number * period]))
         template = assembly.law.reset(
-            Measurement(**{n: seen.get(n, np.zeros((1, 0))) for n in Measurement._fields}),
+            Measurement(**{n: seen.get(n, np.empty((1, 0))) for n in Measurement._fields}),
             type(wanted)(*(values[0] for values in wanted)),
         )
         names = getattr(template, "_fields", ())

@@ -1,13 +1,14 @@
 """Flying again from the log alone."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from log_samples import rewritten
 
 from mjspace.assembly import assemble
+from mjspace.contract import Measurement, Reference
 from mjspace.errors import InputError
 from mjspace.flight import Result, run
 from mjspace.flown import scenario_of
@@ -15,8 +16,11 @@ from mjspace.loading import component, to_toml
 from mjspace.log_layout import doubles
 from mjspace.log_reader import Log
 from mjspace.plant import UnphysicalInertiaWarning
-from mjspace.replay import replay, verify
+from mjspace.replay import Difference, assembly_of, first_difference, replay, start_of, verify
 from mjspace.scenario import Scenario
+from mjspace.simulation import fly
+from mjspace.start import first_start
+from mjspace.tape import Block, Rows, shapes
 
 pytestmark = pytest.mark.filterwarnings(
     f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
@@ -161,6 +165,123 @@ def test_one_bit_of_any_field_is_named(
         verify(path)
 
 
+TIMES = np.array([0.0, 0.1, 0.2, 0.3])
+
+
+def difference(*changed: tuple[str, str, int, int], rows: int = 4) -> Any:
+    """Return where a flight first differs from a log of that many rows; each change adds 0.5."""
+    flown: Rows = {
+        "/state": {"physics": np.zeros((4, 3)), "law_p": np.zeros((4, 2, 2))},
+        "/law": {"error": np.zeros(4)},
+    }
+    logged: Rows = {
+        topic: {"time": TIMES[:rows], **{name: a[:rows].copy() for name, a in fields.items()}}
+        for topic, fields in flown.items()
+    }
+    for topic, field, row, index in changed:
+        flown[topic][field].reshape(4, -1)[row, index] += 0.5
+    return first_difference(logged, flown)
+
+
+def test_of_several_differences_the_first_is_named() -> None:
+    late, wide, scalar = ("/state", "physics", 3, 0), ("/state", "law_p", 2, 3), ("/law", "error")
+    assert difference() is None
+    assert difference(late) == Difference(0.3, *late[:2], 0, 0.0, 0.5)
+    # in time, whatever the order of the fields
+    assert difference(late, wide) == Difference(0.2, "/state", "law_p", 3, 0.0, 0.5)
+    assert difference(late, wide, (*scalar, 1, 0)) == Difference(0.1, *scalar, 0, 0.0, 0.5)
+    # of one field
+    several = [("/state", "physics", row, index) for row, index in ((2, 2), (1, 2), (1, 1))]
+    assert difference(*several) == Difference(0.1, "/state", "physics", 1, 0.0, 0.5)
+    # of one instant, in the order in which they are flown
+    both = [(*scalar, 2, 0), wide, ("/state", "physics", 2, 1)]
+    assert difference(*both) == Difference(0.2, "/state", "physics", 1, 0.0, 0.5)
+    # a log that ends before
+    assert difference(late, rows=3) is None
+    assert difference(wide, rows=3) == Difference(0.2, "/state", "law_p", 3, 0.0, 0.5)
+    assert difference(wide, rows=0) is None
+
+
+def test_bits_are_compared_and_not_numbers() -> None:
+    zero, lost = np.zeros((1, 1)), np.full((1, 1), np.nan)
+    for logged, flown, differ in ((zero, -zero, True), (lost, lost, False), (lost, -lost, True)):
+        log: Rows = {"/law": {"time": TIMES[:1], "x": logged}}
+        assert (first_difference(log, {"/law": {"x": flown}}) is not None) is differ
+
+
+def test_progress_is_told_to_the_end_of_the_log_and_no_further(
+    noisy: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the flight was interrupted: it is not flown on to the end of its scenario."""
+    from mjspace import replay as module
+
+    monkeypatch.setattr("mjspace.simulation.BLOCK_SECONDS", np.inf)
+    monkeypatch.setattr("mjspace.simulation.BLOCK_PERIODS", 150)
+    longer = scenario_of(noisy.log).model_copy(update={"duration": 0.8})
+    for flown in (scenario_of(noisy.log), longer):
+        monkeypatch.setattr(module, "scenario_of", lambda _, flown=flown: flown)
+        told: list[float] = []
+        assert verify(noisy.path, progress=told.append) is None
+        assert told == pytest.approx([0.149, 0.299, min(0.449, flown.duration)])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"/new": {"x": (1,)}}, r"/new holds None, flown again \{'x': \(1,\)\}"),
+        ({"/law": None}, r"/law holds \{.*\}, flown again None"),
+        ({"/command": {"torque": (4,)}}, r"/command holds .*, flown again \{'torque': \(4,\)\}"),
+    ],
+)
+def test_a_log_of_other_topics_is_refused(
+    noisy: Result, monkeypatch: pytest.MonkeyPatch, change: dict[str, Any], message: str
+) -> None:
+    """As one of a version that logged more, less, or otherwise."""
+    from mjspace import replay as module
+
+    def other(block: Block) -> dict[str, Any]:
+        return {topic: f for topic, f in (shapes(block) | change).items() if f is not None}
+
+    monkeypatch.setattr(module, "shapes", other)
+    with pytest.raises(InputError, match=rf"log: {message}: another version of mjspace wrote it"):
+        verify(noisy.path)
+
+
+def test_a_law_is_reset_with_what_was_measured_and_desired_there(
+    noisy: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It tells the names of its state so, whose values are the log's."""
+    asked: list[Any] = []
+    with assembly_of(noisy.log) as built:
+        reset = type(built.law).reset
+
+        def noting(law: Any, measurement: Measurement, reference: Reference) -> Any:
+            asked.append((measurement, reference))
+            return reset(law, measurement, reference)
+
+        monkeypatch.setattr(type(built.law), "reset", noting)
+        next(fly(built, first_start(built, [0])))
+        start = start_of(noisy.log, built, 0.25)
+        (first, _), (measurement, reference) = asked
+        assert [np.shape(a) for a in measurement] == [np.shape(a) for a in first]
+        rate = noisy.log.nearest("/measurement", 0.25)["rate"]
+        np.testing.assert_array_equal(measurement.rate[0], rate)
+        desired = built.reference.at(np.array([0.25]))
+        for name, value in reference._asdict().items():
+            np.testing.assert_array_equal(value, getattr(desired, name)[0])
+        assert start.period == 250
+        assert start_of(noisy.log, built, 0.25, fresh_law=True).law is None
+        assert len(asked) == 2
+
+        class Other(NamedTuple):
+            memory: float
+
+        monkeypatch.setattr(type(built.law), "reset", lambda *_: Other(0.0))
+        message = "the log has no state 'memory' for this law: another flew"
+        with pytest.raises(InputError, match=message):
+            start_of(noisy.log, built, 0.25)
+
+
 def test_another_law_from_the_middle(noisy: Result, tmp_path: Path) -> None:
     (tmp_path / "damper.py").write_text(DAMPER)
     other = component("damper.py:Damper", ["gain=3"])
@@ -228,7 +349,9 @@ def test_a_log_whose_state_is_laid_out_otherwise_is_refused(noisy: Result, tmp_p
 
 
 def test_an_attachment_stays_in_its_folder(noisy: Result, tmp_path: Path) -> None:
-    inside = rewritten(noisy.path, tmp_path / "in.mcap", attachments={"law/beside.py": b""})
+    """What is nobody's own code is not written at all."""
+    within = dict.fromkeys(("law/beside.py", "law/further/down/there.py", "../note.txt"), b"")
+    inside = rewritten(noisy.path, tmp_path / "in.mcap", attachments=within)
     assert verify(inside) is None
     outside = rewritten(noisy.path, tmp_path / "out.mcap", attachments={"law/../../up.py": b""})
     with pytest.raises(InputError, match=r"the attachment 'law/\.\./\.\./up\.py' leads out"):

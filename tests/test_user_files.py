@@ -10,7 +10,7 @@ from mjspace.components import load_object
 from mjspace.contract import Measurement
 from mjspace.flight import run
 from mjspace.log_reader import Log
-from mjspace.replay import replay, verify
+from mjspace.replay import assembly_of, replay, start_of, verify
 from mjspace.user_files import beside, load_file
 
 LAW = """
@@ -80,6 +80,8 @@ def test_a_log_of_a_law_of_several_files_is_flown_again_without_them(tmp_path: P
         *("law/tools/__init__.py", "law/tools/scale.py", "law/tools/factor.py"),
     }
     assert verify(path) is None
+    with assembly_of(log) as built:  # not reset again where it has no state
+        assert start_of(log, built, 0.05).law == ()
     again = replay(path, tmp_path / "again").path  # whose log can be flown again as well
     assert verify(again) is None
 
