@@ -257,7 +257,7 @@ def test_what_the_results_say_of_themselves_is_written_and_never_believed() -> N
 def test_results_do_not_change() -> None:
     row = Row.judged(Bound("error", "rad", 1.0, "because"), 2.0)
     with pytest.raises(ValidationError, match="frozen"):
-        row.passed = True  # type: ignore[misc]
+        row.passed = True
     assert not row.passed
 
 
