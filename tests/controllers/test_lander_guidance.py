@@ -41,6 +41,12 @@ def test_it_follows_its_curve_in_the_plane_of_its_azimuth_and_then_its_last_spee
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
 
 
+def test_its_curve_is_that_of_the_soles_1_8_m_below_the_origin() -> None:
+    """As they are on the lander, which starts 1000 m up and 2500 m away, 3 to 4 of it along y."""
+    start = BezierDescent().at(np.zeros(1)).position[0]
+    np.testing.assert_allclose(start, [2000.0, 1500.0, 1001.8], rtol=0.0, atol=0.02)
+
+
 @pytest.mark.parametrize(
     ("gain", "admitted", "refused"),
     [
