@@ -62,11 +62,11 @@ class BezierDescent(Gains):
 
     def at(self, time: Array) -> Trajectory:
         """Return the descent at each ``time`` [s]."""
-        late = np.maximum(time - self.duration, 0.0)[:, None]
-        motion = curve(self.points, self.duration, np.clip(time / self.duration, 0.0, 1.0))
-        motion[0] = motion[0] + late * motion[1]
+        late = np.maximum(time - self.duration, 0.0)
+        motion = curve(self.points, self.duration, np.minimum(time / self.duration, 1.0))
+        motion[0] += late[:, None] * motion[1]
         for part in motion[2:]:
-            part[late[:, 0] > 0.0] = 0.0
+            part[late > 0.0] = 0.0
         c, s = np.cos(self.azimuth), np.sin(self.azimuth)
         to_world = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         motion = [part @ to_world for part in motion]

@@ -61,19 +61,20 @@ class FaultSet:
         self._tables, self._kinds, self._hold = tables, kinds, hold
         self._vehicles = len(members)
         known = _places(kinds, motors)
-        self._places, self._delays, self._noises = [], [], []
+        self._places, self._noises = [], []
+        self._lengths = []  # of what is remembered of each
         for number, fault in enumerate(tables):
             if fault.motor not in known:
                 raise ValueError(
                     f"faults.{number}.motor: none is called {fault.motor!r}"
                     f"{nearest(fault.motor, known)}"
                 )
-            place, delay = known[fault.motor], 0
+            place, length = known[fault.motor], int(fault.kind == "stuck")
             if fault.kind == "delayed" and fault.value:
                 key = f"faults.{number}.value"
-                delay = whole_number(fault.value, hold, key, "what is held by actuators")
+                length = whole_number(fault.value, hold, key, "what is held by actuators")
             self._places.append(place)
-            self._delays.append(delay)
+            self._lengths.append(length)
             width = len(place.columns)
             self._noises.append(normals(seed, members, (STREAM + number,), width))
 
@@ -85,8 +86,7 @@ class FaultSet:
         given, the newest last.
         """
         state = {"fault_phase": np.full((self._vehicles, len(self._tables)), _WAITING)}
-        for number, fault in enumerate(self._tables):
-            length = {"delayed": self._delays[number], "stuck": 1}.get(fault.kind, 0)
+        for number, length in enumerate(self._lengths):
             if length:
                 width = len(self._places[number].columns)
                 state[f"fault_{number}_past"] = np.zeros((self._vehicles, width, length))
@@ -121,7 +121,7 @@ class FaultSet:
     ) -> tuple[State, tuple[Array, ...]]:
         """Return (state, what the motors give instead of ``given``) from ``now`` [s] on."""
         state, result = state.copy(), list(given)
-        for number, (fault, place) in enumerate(zip(self._tables, self._places, strict=True)):
+        for number, place in enumerate(self._places):
             right = result[place.kind][:, place.columns]
             field = f"fault_{number}_past"
             past = state.get(field)
@@ -130,7 +130,7 @@ class FaultSet:
             in_force = state["fault_phase"][:, number] == _IN_FORCE
             if past is not None:
                 newest = np.concatenate([past[..., 1:], right[..., None]], axis=-1)
-                keeps = in_force & (fault.kind == "stuck")
+                keeps = in_force & (self._tables[number].kind == "stuck")
                 state[field] = np.where(keeps[:, None, None], past, newest)
             changed = result[place.kind].copy()
             changed[:, place.columns] = np.where(in_force[:, None], wrong, right)
@@ -153,9 +153,9 @@ class FaultSet:
 
     def _is_due(self, number: int, now: float, seen: Mapping[str, Any] | None) -> Any:
         fault = self._tables[number]
-        if fault.when is None:
-            return now >= (fault.at or 0.0) - TICK
-        if seen is None:
+        if fault.at is not None:
+            return now >= fault.at - TICK
+        if fault.when is None or seen is None:
             return np.bool_(False)
         arrays = {
             f"/{topic}": {n: np.asarray(a) for n, a in values._asdict().items() if np.size(a)}

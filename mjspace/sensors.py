@@ -68,7 +68,7 @@ class SensorSuite:
         ]
         self._sensors = [sensor for sensor in every if sensor is not None]
         self._absent = [name for name in OPTIONAL if getattr(sensors, name) is None]
-        self._ideal = not self._sensors and len(self._absent) in (0, len(OPTIONAL))
+        self._ideal = not self._sensors and len(self._absent) == len(OPTIONAL)
         self._strapdown = None
         if sensors.specific_force is not None:
             period = next(s.period for s in self._sensors if s.name == "specific_force")
@@ -208,8 +208,8 @@ def _turn_kernel(q: Any, error: Any, digit: Any, turned: Any) -> None:
     turned[3] = q[0] * z + q[1] * y - q[2] * x + q[3] * w
     if digit > 0.0:
         square = 0.0
-        for i in range(4):
+        for i in range(turned.size):
             turned[i] = np.rint(2.0 * turned[i] / digit)
             square += turned[i] * turned[i]
-        for i in range(4):
+        for i in range(turned.size):
             turned[i] /= sqrt(square)

@@ -11,7 +11,7 @@ from mjspace.assembly import assemble
 from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.fault_tables import Fault
-from mjspace.faults import STREAM, FaultSet, between
+from mjspace.faults import FaultSet, between
 from mjspace.flight import run
 from mjspace.loading import load
 from mjspace.noise import normals
@@ -78,6 +78,35 @@ def test_the_phase_in_the_log_is_0_before_1_while_it_lasts_and_2_after() -> None
     assert phases == [0.0, 1.0, 1.0, 2.0, 2.0]
 
 
+def test_a_delayed_motor_gives_nothing_until_the_delay_has_passed() -> None:
+    rows, _ = given(kind="delayed", value="300 ms", at=0.0)
+    assert rows[:, 0, 1].tolist() == [0.0, 0.0, 0.0, *RIGHT[:-3, 1]]
+
+
+def test_a_fault_that_is_over_before_its_signal_begins_never() -> None:
+    table = {"motor": "wheel_1", "kind": "dead", "until": 0.2}
+    table["when"] = {"signal": "truth.rate", "above": 1.0}
+    fault = Fault.model_validate(table)
+    faults = FaultSet([fault], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0])
+    state, told = faults.reset(), []
+    for k, rate in enumerate([0.5, 0.5, 2.0, 2.0]):
+        seen = {"truth": SimpleNamespace(_asdict=lambda rate=rate: {"rate": np.array([[rate]])})}
+        state, happened = faults.decide(state, k * HOLD, seen)
+        told += happened
+    assert told == []
+    assert state["fault_phase"].tolist() == [[0.0]]
+
+
+def test_between_control_instants_no_signal_begins_a_fault() -> None:
+    table = {"motor": "wheel_1", "kind": "dead", "when": {"signal": "truth.rate", "above": 1.0}}
+    faults = FaultSet(
+        [Fault.model_validate(table)], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0]
+    )
+    state, happened = faults.decide(faults.reset(), 0.05, None)
+    assert happened == []
+    assert state["fault_phase"].tolist() == [[0.0]]
+
+
 @pytest.mark.parametrize(
     ("times", "falls_between"),
     [
@@ -108,9 +137,12 @@ def test_noise_is_of_that_size_and_a_members_own() -> None:
 
 
 def test_noise_is_of_a_stream_that_no_sensor_has() -> None:
-    """Its numbers are those of ``normals`` for seed 3 and stream 1000 + the fault's number."""
+    """Its numbers are those of ``normals`` for seed 3 and stream 1000 + the fault's number.
+
+    With another stream, a logged flight would not be replayed.
+    """
     rows, _ = given(2, kind="noisy", value=0.1, at=0.0)
-    expected = normals(3, range(2), (STREAM,), 1)
+    expected = normals(3, range(2), (1000,), 1)
     for k, row in enumerate(rows):
         np.testing.assert_array_equal(row[:, 1:2], RIGHT[k, 1] + 0.1 * expected(k))
     wheels = [ReactionWheels(np.eye(3))]
@@ -118,7 +150,7 @@ def test_noise_is_of_a_stream_that_no_sensor_has() -> None:
     faults = FaultSet(tables, wheels, MOTORS, HOLD, seed=3, members=[0])
     state, _ = faults.decide(faults.reset(), 0.0, {})
     _, (row,) = faults.change(state, (np.zeros((1, 3)),), 0.0)
-    assert row[0, 1] == normals(3, [0], (STREAM + 1,), 1)(0)[0, 0]
+    assert row[0, 1] == normals(3, [0], (1001,), 1)(0)[0, 0]
     assert row[0, 0] != row[0, 1]
 
 
@@ -132,6 +164,13 @@ def test_a_fault_begins_when_any_topic_says_so() -> None:
         faults = FaultSet([fault], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0, 1])
         _, happened = faults.decide(faults.reset(), 0.0, seen)
         assert [vehicle for _, vehicle, *_ in happened] == began, signal
+    # Of two vehicles each has two components.
+    fault = Fault.model_validate(
+        {"motor": "wheel_0", "kind": "dead", "when": {"signal": "truth.rate[2]", "above": 3.5}}
+    )
+    faults = FaultSet([fault], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0, 1])
+    with pytest.raises(InputError, match=r"faults\.0\.when\.signal: .* has 2 components"):
+        faults.decide(faults.reset(), 0.0, seen)
 
 
 def test_axes_of_a_torque_on_the_bus_are_its_motors() -> None:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import Generator, Philox, SeedSequence
 
 from mjspace.attitude import conjugate, from_rotation_vector, multiply, to_rotation_vector
 from mjspace.contract import Array, Measurement
 from mjspace.noise import normals
 from mjspace.sensor_tables import RateSensor, Sensors, StarTracker
-from mjspace.sensors import SensorSuite, State
+from mjspace.sensors import OPTIONAL, SensorSuite, State
 from mjspace.tables import Rates
 
 EVERYTHING: dict[str, Any] = {"noise": 1e-2, "bias": 0.1, "bias_walk": 2e-2, "quantization": 1e-3}
@@ -147,6 +148,26 @@ def test_allan_variance_of_noise_and_of_walk(noise: float, walk: float) -> None:
         assert abs(allan / expected - 1.0) < FIVE_SIGMA * spread
 
 
+def test_an_error_is_made_of_its_own_numbers() -> None:
+    """A logged flight is replayed only as long as sample k adds up the same numbers."""
+    members, period = (4, 9), 2e-3
+    tables = {"noise": 1e-2, "bias": 0.5, "bias_walk": 0.3}
+    sensors = suite(members, rates=Rates(control=period), attitude=tables, rate=tables)
+    truth = [moving(step, members) for step in range(0, 12, 2)]
+    _, seen = fly(sensors, lambda step: truth[step // 2], range(0, 12, 2))
+    # A sensor's first number is its field's in Measurement; then 0: bias, 1: noise, 2: walk.
+    for name, first in (("attitude", 0), ("rate", 1)):
+        bias, noise, walk = (normals(7, members, (first, part), 3) for part in range(3))
+        drifted = np.zeros((2, 3))
+        for k, measurement in enumerate(seen):
+            error = 0.5 * bias(0) + 1e-2 * noise(k) + drifted
+            drifted += 0.3 * np.sqrt(period) * walk(k)
+            true = getattr(truth[k], name)
+            turned = name == "attitude"
+            expected = multiply(true, from_rotation_vector(error)) if turned else true + error
+            np.testing.assert_allclose(getattr(measurement, name), expected, rtol=0.0, atol=1e-15)
+
+
 def test_walk_has_its_deviation_after_one_second_at_any_period() -> None:
     vehicles, walk = 2000, 0.3
     for period, steps in ((0.1, 100), (0.25, 250)):
@@ -202,6 +223,15 @@ def test_normals_do_not_depend_on_what_was_asked_before() -> None:
     assert np.unique(drawn).size == drawn.size
     with pytest.raises(ValueError, match="read-only"):
         forth(0)[:] = 0.0
+
+
+def test_each_block_of_normals_has_a_key_of_its_own() -> None:
+    """That of (seed, member, stream, block), 256 samples in each: logged flights were drawn so."""
+    sample = normals(3, [4], (0, 1), 2)
+    for block, index, row in ((0, 0, 0), (0, 255, 255), (1, 256, 0), (3, 1000, 232)):
+        key = SeedSequence(3, spawn_key=(4, 0, 1, block))
+        drawn = Generator(Philox(key)).standard_normal((256, 2))
+        assert sample(index).tolist() == [drawn[row].tolist()]
 
 
 def test_same_seed_same_bits_and_another_seed_others() -> None:
@@ -283,6 +313,77 @@ def test_a_report_is_the_newest_sample_that_is_old_enough(
         assert np.allclose(measurement.attitude, expected.attitude, rtol=0.0, atol=1e-15)
 
 
+def test_a_late_report_is_that_of_a_prompt_sensor_before_and_the_first_until_then() -> None:
+    tables = dict.fromkeys(("attitude", "rate", "wheel_speed"), EVERYTHING)
+    late = {name: table | {"delay": 3e-3} for name, table in tables.items()}
+    prompt, delayed = (fly(suite(**each), moving, range(10))[1] for each in (tables, late))
+    for step, measurement in enumerate(delayed):
+        assert_same_bits(measurement, prompt[max(step - 3, 0)])
+
+
+def surroundings(step: int) -> Measurement:
+    """Return the truth of two vehicles that fall without turning, with every optional field.
+
+    Their specific force is not a number: what accelerometers show is the mean over their period.
+    """
+    time = 1e-3 * step
+    up = np.array([[0.0, 0.0, 1.0], [0.0, 0.6, 0.8]])
+    return still(2)._replace(
+        position=(50.0 - 20.0 * time**3) * up,
+        velocity=-60.0 * time**2 * up,
+        altitude=(50.0 - 20.0 * time**3) * up[:, 2:],
+        ground_velocity=-60.0 * time**2 * up,
+        specific_force=np.full((2, 3), np.nan),
+        magnetic_field=3e-5 * up,
+    )
+
+
+def test_a_sensor_that_is_left_out_shows_nothing() -> None:
+    truth = surroundings(0)
+    widths = {"altitude": 1}
+    for name in OPTIONAL:
+        tables = Sensors.model_validate({name: {}})
+        sensors = SensorSuite(tables, Rates(), 7, (0, 1), 3)
+        _, seen = sensors.sample(sensors.reset(truth), 0, truth)
+        shapes = {other: getattr(seen, other).shape for other in OPTIONAL}
+        expected = dict.fromkeys(OPTIONAL, (2, 0)) | {name: (2, widths.get(name, 3))}
+        assert shapes == expected
+        if name != "specific_force":
+            assert getattr(seen, name) is getattr(truth, name)
+
+
+def test_an_altimeter_errs_along_its_one_axis() -> None:
+    truth = surroundings(0)
+    sensors = SensorSuite(Sensors.model_validate({"altitude": EVERYTHING}), Rates(), 7, (0, 1), 3)
+    state = sensors.reset(truth)
+    assert state["altitude_walk"].shape == (2, 1)
+    assert sensors.sample(state, 0, truth)[1].altitude.shape == (2, 1)
+
+
+def test_accelerometers_show_the_mean_of_their_own_period() -> None:
+    tables: Any = {
+        "rate": {"noise": 1e-3, "period": 2e-3},
+        "specific_force": {"period": 5e-3},
+        "position": {"delay": 1e-3},
+    }
+    down = np.array([0.0, 0.0, -1.6])
+    sensors = SensorSuite(
+        Sensors.model_validate(tables),
+        Rates(),
+        7,
+        (0, 1),
+        3,
+        lambda place: np.broadcast_to(down, place.shape),
+    )
+    assert sensors.ticks == {1, 2, 5}
+    _, seen = fly(sensors, surroundings, range(20))
+    for step, measurement in enumerate(seen):
+        newest = surroundings(step // 5 * 5)
+        gained = newest.velocity - surroundings(step // 5 * 5 - 5).velocity
+        expected = gained / 5e-3 - down if step >= 5 else np.zeros((2, 3))
+        np.testing.assert_allclose(measurement.specific_force, expected, rtol=0.0, atol=1e-12)
+
+
 def test_without_a_period_a_sensor_samples_at_the_control_rate() -> None:
     sensors = suite(rates=Rates(control=5e-3), rate={"noise": 1.0}, attitude={"delay": 0.01})
     assert sensors.ticks == {5}
@@ -329,6 +430,13 @@ def test_a_measured_quaternion_is_of_unit_length_and_of_the_true_sign() -> None:
             assert np.all(np.sum(seen * signed.attitude, axis=1) > 0.9)
 
 
+def test_the_coarsest_digit_of_an_attitude_still_shows_one() -> None:
+    attitude = np.array([[0.5, -0.5, 0.5, 0.5]])  # of which no component is large
+    sensors, truth = suite(attitude={"quantization": 0.999}), still()._replace(attitude=attitude)
+    _, seen = sensors.sample(sensors.reset(truth), 0, truth)
+    np.testing.assert_allclose(seen.attitude, attitude, rtol=0.0, atol=1e-15)
+
+
 @pytest.mark.parametrize("wheels", [0, 4])
 def test_any_number_of_wheels_is_read(wheels: int) -> None:
     sensors = suite((0, 1), wheels=wheels, wheel_speed=EVERYTHING)
@@ -351,7 +459,7 @@ def test_any_number_of_wheels_is_read(wheels: int) -> None:
             {"attitude": {"delay": 4e-4}},
             r"sensors\.attitude\.delay: .* rates\.control, 0\.001 s: .* 0\.001 s",
         ),
-        ({"attitude": {"quantization": 1.5}}, r"attitude\.quantization 1\.5 rad"),
+        ({"attitude": {"quantization": 1.0}}, r"attitude\.quantization 1 rad"),
     ],
 )
 def test_what_cannot_be_sampled_is_refused(tables: dict[str, Any], message: str) -> None:

@@ -89,6 +89,7 @@ def test_the_sample_of_the_start_is_none_and_shares_no_memory() -> None:
 def test_a_batch_feels_what_each_feels_alone() -> None:
     rng = np.random.default_rng(3)
     turned = [attitude.normalize(START + 0.05 * rng.normal(size=(3, 4))) for _ in range(2)]
+    turned[1][1] *= -1.0  # the same attitude
     moved = [rng.normal(size=(3, 3)) for _ in range(2)]
     empty = np.zeros((3, 0))
 

@@ -271,9 +271,7 @@ class Watch:
         """Return the tests that reach each line, the fastest first; under 0, all of them."""
         order = sorted(self.seconds, key=lambda test: self.seconds[test])
         reached = {n: [t for t in order if n in self.lines.get(t, ())] for n in self._all_lines()}
-        # Of a constant over several lines only one is traced: the others are reached by all.
-        everywhere = {n for n, tests in reached.items() if n in self.lines[""] or not tests}
-        return {0: order} | {n: order if n in everywhere else t for n, t in reached.items()}
+        return {0: order} | {n: order if n in self.lines[""] else t for n, t in reached.items()}
 
     def _all_lines(self) -> set[int]:
         return set().union(*self.lines.values())
@@ -404,8 +402,10 @@ class Module:
         for place in chosen:
             changed = mutant(self.source, *place)
             lines = range(changed.line, changed.last + 1)
-            names = [t for t in nominal.plan[0] if any(t in nominal.plan.get(n, ()) for n in lines)]
-            if not names or tested(self, changed.tree, names, limit).passed:
+            # Of a statement over several lines not each is traced: all tests may reach the others.
+            reach = [nominal.plan[n] for n in lines if n in nominal.plan] or [nominal.plan[0]]
+            names = [t for t in nominal.plan[0] if any(t in tests for tests in reach)]
+            if tested(self, changed.tree, names, limit).passed:
                 survivors.append(changed)
         return len(chosen), survivors
 

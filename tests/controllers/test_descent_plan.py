@@ -3,10 +3,12 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from mjspace.controllers import guidance
 from mjspace.controllers.bezier import curve
 from mjspace.controllers.descent_limits import Limits, keeps, shortest_duration, thriftiest
 from mjspace.controllers.guidance import EXHAUST_SPEED, TABLE_3, burnt, plan
@@ -60,7 +62,10 @@ def test_what_is_kept_uses_its_limits_up() -> None:
     [
         ((100.0, 0.0, 100.0), (-24.0, 0.0, -60.0), "full thrust does not brake it"),
         ((2500.0, 0.0, 300.0), (-24.0, -7.0, -10.0), "below the glide slope"),
-        ((0.0, 0.0, 2.2), (0.0, 0.0, -0.5), "lasts between 0.3373 and 0.4 s"),
+        # 1000 m away: 150 m above the end, less a metre.
+        ((600.0, 800.0, 150.9), (0.0, 0.0, -60.0), "below the glide slope"),
+        ((600.0, 800.0, 151.1), (0.0, 0.0, -60.0), "full thrust does not brake it"),
+        ((0.0, 0.0, 2.4), (0.0, 0.0, -0.5), "lasts between 0.601 and 0.8 s"),
         ((10.0, 0.0, 3.0), (20.0, 0.0, 0.0), "of 1.549 to 20.1 s keeps within the limits"),
     ],
 )
@@ -69,6 +74,62 @@ def test_what_cannot_be_flown_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=f"no descent from .* {why}"):
         plan(np.array(place), np.array(velocity))
+
+
+class Costs:
+    """Costs of durations instead of those of real descents, and the durations that were tried."""
+
+    def __init__(self, cost: Callable[[float], float]) -> None:
+        self.cost, self.tried = cost, list[float]()
+
+    def thriftiest(self, duration: float, *_: object) -> tuple[np.ndarray, float]:
+        self.tried.append(duration)
+        return np.zeros((10, 3)), self.cost(duration)
+
+    def plan(self, place: np.ndarray, velocity: np.ndarray) -> float:
+        """Return the duration that the search finds."""
+        self.tried.clear()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(guidance, "thriftiest", self.thriftiest)
+            patch.setattr(guidance, "keeps", lambda *_: True)
+            return plan(place, velocity)[0]
+
+
+@pytest.mark.parametrize("best", [21.0, 33.3, 41.7, 100.0, 150.0, 190.0])
+def test_the_search_finds_the_least_cost_to_a_twentieth_of_a_second(best: float) -> None:
+    costs = Costs(lambda duration: 1000.0 + (duration - best) ** 2)
+    assert costs.plan(ABOVE, AT_REST) == pytest.approx(best, abs=0.025)
+
+
+@pytest.mark.parametrize("slope", [1.0, -1.0])
+def test_the_search_stays_between_the_shortest_and_the_longest_duration(slope: float) -> None:
+    shortest = shortest_duration(98.0, 0.0, MOON)
+    longest = np.hypot(100.0, 98.0) / 0.5
+    costs = Costs(lambda duration: 1000.0 + slope * duration)
+    end = shortest if slope > 0.0 else longest
+    assert costs.plan(ABOVE, AT_REST) == pytest.approx(end, abs=0.05)
+    assert shortest <= min(costs.tried)
+    assert max(costs.tried) <= longest
+
+
+@pytest.mark.parametrize("speed", [-3.0, 2.0])
+@pytest.mark.parametrize("least", range(50, 60))  # a pace is 8 s: some durations are near the last
+def test_no_duration_is_tried_that_gravity_losses_alone_make_dearer(
+    least: float, speed: float
+) -> None:
+    """Thrust over weight, summed over time, is the time and the gain of speed over gravity."""
+    costs = Costs(lambda _: least)
+    costs.plan(ABOVE, np.array([0.0, 0.0, speed]))
+    dearest = least + (0.5 + speed) / 1.62283
+    assert dearest / guidance.PACE < max(costs.tried) <= dearest
+
+
+def test_the_least_is_found_with_one_cost_for_each_step() -> None:
+    costs = Costs(lambda duration: (duration - 77.7) ** 2)
+    found = guidance._golden(lambda duration: costs.thriftiest(duration)[1], 60.0, 90.0)
+    assert found == pytest.approx(77.7, abs=0.025)
+    # Each leaves 0.618 of what was left: 30 s * 0.618^14 = 0.036 s; two begin.
+    assert len(costs.tried) == 16
 
 
 def test_it_is_the_same_on_any_number_of_threads() -> None:

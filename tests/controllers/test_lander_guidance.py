@@ -6,12 +6,63 @@ import numpy as np
 import pytest
 from lander_laws import LANDS
 from lander_oracle import Flight, Start, Vehicle, fly
-from mjspace.controllers.descent import SineDescent
+from mjspace.controllers.bezier import curve
+from mjspace.controllers.descent import SineDescent, powered
 from mjspace.controllers.guidance import BezierDescent
 from mjspace.controllers.lander_vectoring import ThrustVectoring
 
 LAW = ThrustVectoring(0.02)
 LAGS = {"thrust_lag": 0.1, "gimbal_lag": 0.05, "gimbal_rate": np.radians(20.0)}
+
+
+def test_it_follows_its_curve_in_the_plane_of_its_azimuth_and_then_its_last_speed() -> None:
+    points = np.random.default_rng(5).normal(size=(7, 3)) * 10.0
+    azimuth, stance = 0.5, 1.3
+    descent = BezierDescent(duration=20.0, points=points, azimuth=azimuth, stance=stance)
+    c, s = np.cos(azimuth), np.sin(azimuth)
+    to_world = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def world(time: np.ndarray) -> list[np.ndarray]:
+        """Return the motion on the curve, of the vehicle's origin."""
+        motion = [part @ to_world.T for part in curve(points, 20.0, time / 20.0)]
+        motion[0] = motion[0] + [0.0, 0.0, stance]
+        return motion
+
+    time = np.array([0.0, 3.0, 11.0, 20.0])
+    expected = powered(world(time), azimuth, 4.902e12, 1.738e6)
+    for one, other in zip(descent.at(time), expected, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
+
+    place, velocity, *_ = world(np.full(2, 20.0))
+    late = np.array([0.5, 30.0])
+    coasting = [place + late[:, None] * velocity, velocity, *np.zeros((3, 2, 3))]
+    expected = powered(coasting, azimuth, 4.902e12, 1.738e6)
+    for one, other in zip(descent.at(20.0 + late), expected, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
+
+
+def test_its_curve_is_that_of_the_soles_1_8_m_below_the_origin() -> None:
+    """As they are on the lander, which starts 1000 m up and 2500 m away, 3 to 4 of it along y."""
+    start = BezierDescent().at(np.zeros(1)).position[0]
+    np.testing.assert_allclose(start, [2000.0, 1500.0, 1001.8], rtol=0.0, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("gain", "admitted", "refused"),
+    [
+        ("duration", 0.5, 0.0),
+        ("azimuth", 2.0 * np.pi, 6.3),
+        ("azimuth", -2.0 * np.pi, -6.3),
+        ("stance", 0.0, -0.5),
+        ("gravity_parameter", 0.5, 0.0),
+        ("moon_radius", 0.5, 0.0),
+        ("points", np.eye(5, 3), np.eye(4, 3)),
+    ],
+)
+def test_a_descent_that_cannot_be_is_refused(gain: str, admitted: object, refused: object) -> None:
+    BezierDescent(**{gain: admitted})
+    with pytest.raises(ValueError, match=gain):
+        BezierDescent(**{gain: refused})
 
 
 @cache
