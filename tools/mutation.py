@@ -403,7 +403,7 @@ class Module:
             changed = mutant(self.source, *place)
             lines = range(changed.line, changed.last + 1)
             # Of a statement over several lines not each is traced: all tests may reach the others.
-            reach = [nominal.plan[n] for n in lines if n in nominal.plan] or [nominal.plan[0]]
+            reach = [nominal.plan[n] for n in lines if nominal.plan.get(n)] or [nominal.plan[0]]
             names = [t for t in nominal.plan[0] if any(t in tests for tests in reach)]
             if tested(self, changed.tree, names, limit).passed:
                 survivors.append(changed)
