@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from mjspace.components import load_object
 from mjspace.contract import Measurement
@@ -79,6 +80,10 @@ def test_a_log_of_a_law_of_several_files_is_flown_again_without_them(tmp_path: P
         *("law/damper.py", "law/helpers.py", "law/gain.csv"),
         *("law/tools/__init__.py", "law/tools/scale.py", "law/tools/factor.py"),
     }
+    with path.open("rb") as file:
+        types = {a.name: a.media_type for a in make_reader(file).iter_attachments()}
+    assert types["law/helpers.py"] == "text/x-python"
+    assert types["law/gain.csv"] == "application/octet-stream"
     assert verify(path) is None
     again = replay(path, tmp_path / "again").path  # whose log can be flown again as well
     assert verify(again) is None
