@@ -80,8 +80,8 @@ def test_a_log_of_a_law_of_several_files_is_flown_again_without_them(tmp_path: P
         *("law/damper.py", "law/helpers.py", "law/gain.csv"),
         *("law/tools/__init__.py", "law/tools/scale.py", "law/tools/factor.py"),
     }
-    with path.open("rb") as file:
-        types = {a.name: a.media_type for a in make_reader(file).iter_attachments()}
+    with path.open("rb") as stream:
+        types = {a.name: a.media_type for a in make_reader(stream).iter_attachments()}
     assert types["law/helpers.py"] == "text/x-python"
     assert types["law/gain.csv"] == "application/octet-stream"
     assert verify(path) is None
