@@ -43,9 +43,9 @@ def block(rows: NDArray[np.void], channels: Mapping[str, int], time: Nanoseconds
     return Part(rows.view(np.uint8), index)
 
 
-def message(channel: int, time: int, data: bytes, sequence: int = 0) -> Part:
-    """Return one message as a part of a chunk."""
-    record = Message(channel, time, data, time, sequence)
+def message(channel: int, time: int, data: bytes) -> Part:
+    """Return one message, which is not counted, as a part of a chunk."""
+    record = Message(channel, time, data, time, 0)
     return Part(record_bytes(record), {channel: np.array([(time, 0)], INDEX)})
 
 
@@ -66,7 +66,7 @@ def encode(parts: Sequence[Part], position: int) -> tuple[bytes, ChunkIndex, dic
     start = min(int(entries["time"].min()) for entries in index.values())
     end = max(int(entries["time"].max()) for entries in index.values())
 
-    content = parts[0].data if len(parts) == 1 else b"".join(part.data for part in parts)
+    content = b"".join(part.data for part in parts)
     # The frame's own checksum is the one that readers of ours check: it costs nothing.
     packed = zstandard.ZstdCompressor(level=LEVEL, write_checksum=True).compress(content)
     chunk = record_bytes(Chunk("zstd", packed, end, start, zlib.crc32(content), offset))

@@ -71,7 +71,7 @@ class LogFile:
             chunk_count=0,
             message_count=0,
             message_end_time=0,
-            message_start_time=2**64 - 1,
+            message_start_time=0,
             metadata_count=1,
             schema_count=len(schemas),
         )
@@ -131,9 +131,10 @@ class LogFile:
 
     def _count(self, index: ChunkIndex, counts: Mapping[int, int]) -> None:
         seen = self._statistics
+        earlier = seen.message_start_time if seen.chunk_count else index.message_start_time
+        seen.message_start_time = min(earlier, index.message_start_time)
         seen.chunk_count += 1
         seen.message_count += sum(counts.values())
-        seen.message_start_time = min(seen.message_start_time, index.message_start_time)
         seen.message_end_time = max(seen.message_end_time, index.message_end_time)
         for channel, count in counts.items():
             seen.channel_message_counts[channel] += count
@@ -152,8 +153,6 @@ class LogFile:
         self._position += len(data)
 
     def _ending(self) -> bytes:
-        if not self._statistics.chunk_count:
-            self._statistics.message_start_time = 0
         groups = {
             **self._registry,
             Opcode.STATISTICS: record_bytes(self._statistics),

@@ -65,7 +65,6 @@ def _inventory(path: Path) -> Inventory:
             raise ValueError(f"{path} is no MCAP file")
         stream = ReadDataStream(file)
         for opcode, position in _walk(file):
-            file.seek(position)
             if opcode == Opcode.MESSAGE_INDEX:
                 indexes = found.chunks[-1].indexes
                 assert indexes is not None
@@ -145,7 +144,7 @@ def read_messages(
 
 
 def _walk(file: BinaryIO) -> Iterator[tuple[int, int]]:
-    """Yield the opcode of each whole record, and where its content is."""
+    """Yield the opcode of each whole record, and where its content is, with the file put there."""
     # The summary too: other writers put schemas and channels into chunks, and again only there.
     size = file.seek(0, io.SEEK_END)
     position = len(MAGIC)

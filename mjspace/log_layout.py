@@ -29,7 +29,7 @@ HEADER = np.dtype(
 )
 """What stands before each message: MCAP's record header and Message fields, packed."""
 
-_VARINT, _DOUBLE, _BYTES = 0, 1, 2  # protobuf wire types
+_DOUBLE, _BYTES = 1, 2  # protobuf wire types
 _STAMP = b"\x08" + bytes(5) + b"\x10" + bytes(5)  # google.protobuf.Timestamp, both varints padded
 
 
@@ -112,7 +112,7 @@ def transforms(bodies: Sequence[str]) -> Layout:
 
 def varint5(values: NDArray[np.uint64]) -> NDArray[np.uint8]:
     """Return numbers below 2^35, shape (n,), as protobuf varints padded to five bytes, (n, 5)."""
-    digits = (values[:, None] >> np.arange(0, 35, 7, dtype=np.uint64)) & np.uint64(0x7F)
+    digits = (values[:, None] >> np.arange(5, dtype=np.uint64) * np.uint64(7)) & np.uint64(0x7F)
     digits[:, :4] |= np.uint64(0x80)
     return digits.astype(np.uint8)
 

@@ -110,7 +110,7 @@ class LogWriter:
 
     def event(self, time: float, level: str, text: str) -> None:
         """Log ``text`` on /events with the next chunk; ``level`` is one of ``foxglove.Log``'s."""
-        stamp = int(nanoseconds(np.array([time]))[0])
+        stamp = int(nanoseconds(np.array(time)))
         entry = LogMessage(level=LogMessage.Level.Value(level), message=text)
         entry.timestamp.FromNanoseconds(stamp)
         self._pending.append(message(self._channels["/events"], stamp, entry.SerializeToString()))

@@ -116,7 +116,7 @@ class Recorder:
         )
         self._model, self._data = model, mujoco.MjData(model)
         self._stride = max(1, round(FRAME_PERIOD / assembly.scenario.rates.control))
-        self.time = 0.0
+        self.time: float
         """Of the last period written [s]."""
 
     def write(self, block: Block) -> None:

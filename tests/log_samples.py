@@ -60,7 +60,8 @@ def write_block(log: LogWriter, first: int, count: int) -> None:
     """Log a block as a flight does: frames every tenth period and an event, then the periods."""
     time, values = rows(first, count)
     frames = time[::10]
-    turns = np.stack([np.cos(frames), 0 * frames, 0 * frames, np.sin(frames)], axis=-1)
+    axis = np.sin(frames)[:, None] * [0.36, 0.48, 0.8]
+    turns = np.concatenate([np.cos(frames)[:, None], axis], axis=-1)
     places = np.stack([frames, -frames, 0 * frames], axis=-1)
     log.write_transforms(frames, np.stack([places, 2 * places], 1), np.stack([turns, -turns], 1))
     log.event(float(time[count // 2]), "WARNING", f"period {first + count // 2}")
@@ -82,6 +83,7 @@ def rewritten(
     *,
     digests: bool = True,
     attachments: Mapping[str, bytes] = {},
+    compression: CompressionType = CompressionType.ZSTD,
 ) -> Path:
     """Write the log at ``path`` anew with mcap's own writer, as another tool would; return ``out``.
 
@@ -90,7 +92,7 @@ def rewritten(
     """
     numbers: Counter[str] = Counter()
     with path.open("rb") as source, out.open("wb") as target:
-        reader, writer = make_reader(source), Writer(target, compression=CompressionType.ZSTD)
+        reader, writer = make_reader(source), Writer(target, compression=compression)
         summary = reader.get_summary()
         assert summary is not None
         writer.start()

@@ -10,11 +10,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from log_samples import ATTACHMENTS, BLOCKS, METADATA, UNITS, create, fly, rows, write_block
-from mcap.reader import make_reader
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import Channel, Schema
+from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.contract import Array
-from mjspace.log_chunk import encode
+from mjspace.log_chunk import encode, message
+from mjspace.log_file import LogFile
 from mjspace.log_layout import Fields, doubles, varint5
 from mjspace.log_reader import Log
 from mjspace.log_schema import PERIODIC, Scene
@@ -149,11 +152,15 @@ def test_the_nearest_row_is_found_across_chunks(flown: Path, asked: float, found
 
 
 def test_times_are_refused_one_by_one_and_a_window_may_be_open(tmp_path: Path) -> None:
-    for time in ([0.0, -1e-3], [0.002, 0.002], [0.002, 0.001], [0.0, np.nan]):
+    for time in ([0.0, -1e-3], [0.002, 0.002], [0.0, 0.002, 0.001], [0.0, np.nan]):
         with create(tmp_path / "refused.mcap") as log:
-            _, values = rows(0, 2)
+            _, values = rows(0, len(time))
             with pytest.raises(ValueError, match=r"do not increase|starts at zero"):
                 log.write(np.array(time), values)
+    with create(tmp_path / "overlap.mcap") as log:
+        log.write(*rows(0, 3))
+        with pytest.raises(ValueError, match="do not increase"):
+            log.write(np.array([0.001, 0.003]), rows(0, 2)[1])
     with create(tmp_path / "late.mcap") as log:
         _, values = rows(0, 2)
         log.write(np.array([0.0, 5e9]), values)  # beyond 2^62 ns, and the log's clock goes to 2^64
@@ -173,15 +180,17 @@ def test_padded_numbers_are_protobufs(value: int) -> None:
 
 def test_a_message_of_many_long_fields_is_what_protobuf_reads(tmp_path: Path) -> None:
     """More than 15 fields and more than 127 bytes in one: numbers of two bytes in its layout."""
-    fields = {f"f{k}": (5, 8) for k in range(40)}
-    values = {name: np.full((1, 5, 8), float(k)) for k, name in enumerate(fields)}
+    # 128 bytes is the least that takes two in a length; 40 numbers take 320.
+    shapes: list[tuple[int, ...]] = [(5, 8), (2, 8), ()]
+    fields = {f"f{k}": shapes[k % 3] for k in range(40)}
+    values = {name: np.full((1, *shape), float(name[1:])) for name, shape in fields.items()}
     with LogWriter(tmp_path / "x.mcap", {"/truth": fields}, {}, {}, Scene((), b"", ""), {}) as log:
         log.write(np.zeros(1), {"/truth": values})
     with (tmp_path / "x.mcap").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         ((*_, decoded),) = reader.iter_decoded_messages(["/truth"])
-    for k, name in enumerate(fields):
-        assert list(getattr(decoded, name)) == [float(k)] * 40
+    for name, written in values.items():
+        assert np.ravel(getattr(decoded, name)).tolist() == written.ravel().tolist()
 
 
 def test_a_kept_column_does_not_keep_its_chunk(flown: Path) -> None:
@@ -228,6 +237,31 @@ def test_a_slow_disk_holds_up_the_flight_and_not_its_memory(
             write_block(log, 10 * i, 10)
             written += 1
     assert ahead == [2, 2, 2, 2, 2, 2, 2, 1]
+
+
+def test_a_slow_chunk_is_not_overtaken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor by what comes after all chunks: a file that is closed at once waits for them."""
+    begun: list[int] = []
+
+    def slow(parts: Any, position: int) -> Any:
+        begun.append(position)
+        sleep(0.1 if len(begun) == 1 else 0.0)
+        return encode(parts, position)
+
+    monkeypatch.setattr("mjspace.log_file.encode", slow)
+    path = tmp_path / "flight.mcap"
+    file = LogFile(path, [Schema(1, b"", "", "")], [Channel(1, "/a", "", {}, 1)], {}, {})
+    for k in range(2):
+        file.add_chunk([message(1, k, bytes(8))])
+    file.add_metadata("last", {})
+    file.add_chunk([message(1, 2, bytes(8))])
+    file.close()
+    with path.open("rb") as stream:
+        assert [m.log_time for *_, m in NonSeekingReader(stream).iter_messages(None)] == [0, 1, 2]
+        stream.seek(0)
+        kinds = [type(r).__name__ for r in StreamReader(stream, emit_chunks=True).records]
+    order = [kind for kind in kinds if kind in ("Chunk", "Metadata")]
+    assert order == ["Metadata", "Chunk", "Chunk", "Metadata", "Chunk"]
 
 
 @pytest.mark.parametrize(

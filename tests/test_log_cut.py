@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -65,6 +66,52 @@ def test_a_log_cut_anywhere_is_read_up_to_the_last_whole_chunk(cut: float, whole
         assert_prefix(
             path, int(np.sum([n for n, end in zip(BLOCKS, ends, strict=True) if end <= size]))
         )
+
+
+def test_a_chunk_is_read_from_its_last_byte_on_and_without_its_indexes(whole: Path) -> None:
+    with whole.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    content, path = whole.read_bytes(), whole.with_name("edge.mcap")
+    for chunk, count in ((2, BLOCKS[0] + BLOCKS[1]), (1, BLOCKS[0])):
+        place = summary.chunk_indexes[chunk]
+        end = place.chunk_start_offset + place.chunk_length
+        indexes = sorted(place.message_index_offsets.values())
+        for cut in (end, end + 1, indexes[1], indexes[-1] + 3, end + place.message_index_length):
+            path.write_bytes(content[:cut])
+            assert_prefix(path, count + BLOCKS[chunk])
+        path.write_bytes(content[: end - 1])
+        assert_prefix(path, count)
+
+
+def test_a_log_cut_before_its_first_chunk_holds_no_period(whole: Path) -> None:
+    with whole.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    path = whole.with_name("empty.mcap")
+    path.write_bytes(whole.read_bytes()[: summary.chunk_indexes[0].chunk_start_offset])
+    assert_prefix(path, 0)
+
+
+def test_a_log_is_not_complete_whose_records_do_not_lead_to_its_end(whole: Path) -> None:
+    with whole.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    content = bytearray(whole.read_bytes())
+    third = summary.chunk_indexes[2].chunk_start_offset
+    content[third + 8] = 0xFF  # the length, then longer than the file
+    path = whole.with_name("lost.mcap")
+    path.write_bytes(content)
+    assert_prefix(path, BLOCKS[0] + BLOCKS[1])
+
+
+def test_a_record_that_cannot_be_read_is_damage_and_named_as_that(whole: Path) -> None:
+    content = whole.read_bytes()
+    encoding = content.index(b"ros2msg")
+    path = whole.with_name("torn.mcap")
+    path.write_bytes(content[:encoding] + b"\xff" + content[encoding + 1 :])  # no UTF-8
+    with pytest.raises(ValueError, match=r"torn.mcap is damaged: a record in it cannot be read"):
+        Log(path)
 
 
 def test_zeros_that_a_power_cut_left_behind_are_no_records(whole: Path) -> None:
@@ -172,10 +219,23 @@ def fly_and(function: Callable[[int, int], object], path: Path) -> None:
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux only")
-def test_no_space_at_all_is_said_at_once() -> None:
+def test_no_space_at_all_is_said_at_once_and_nothing_stays_open() -> None:
     with pytest.raises(OSError, match="No space left") as caught:
         create(Path("/dev/full"))
     assert caught.value.errno == errno.ENOSPC
+    assert "/dev/full" not in opened()
+
+
+def test_nothing_of_a_closed_log_stays_open(tmp_path: Path) -> None:
+    path = fly(tmp_path / "flight.mcap")
+    assert str(path) not in opened()
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("log")]
+
+
+def opened() -> list[str]:
+    """Return what this process has open; not what was closed since the folder was listed."""
+    files = [Path("/proc/self/fd") / name for name in os.listdir("/proc/self/fd")]
+    return [str(file.readlink()) for file in files if file.is_symlink()]
 
 
 def test_a_damaged_chunk_is_named_and_the_others_are_read(whole: Path) -> None:
@@ -192,6 +252,21 @@ def test_a_damaged_chunk_is_named_and_the_others_are_read(whole: Path) -> None:
     with pytest.raises(ValueError, match=where):
         log.read("/truth")
     assert len(log.read("/truth", end=0.006)["time"]) == BLOCKS[0]
+
+
+def test_a_damaged_chunk_does_not_matter_to_what_is_in_others(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    with create(path) as log:
+        write_block(log, 0, 10)
+        log.write(*rows(10, 10))
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    content = bytearray(path.read_bytes())
+    second = summary.chunk_indexes[1]
+    content[second.chunk_start_offset + second.chunk_length // 2] ^= 0x10
+    path.write_bytes(content)
+    assert [event.message for event in Log(path).events()] == ["period 5"]
 
 
 def test_messages_that_another_program_encoded_anew_are_not_misread(tmp_path: Path) -> None:

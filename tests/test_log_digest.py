@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_samples import BLOCKS, TOPICS, create, fly, rewritten, write_block
+from log_samples import BLOCKS, METADATA, TOPICS, create, fly, rewritten, write_block
 from mcap.reader import make_reader
+from mcap.records import Metadata
 
+from mjspace.log_chunk import record_bytes
 from mjspace.log_reader import Log
 
 
@@ -42,6 +44,17 @@ def test_a_log_is_as_it_was_written_also_after_another_tool_wrote_it(
 ) -> None:
     assert Log(flown).altered() == []
     assert Log(rewritten(flown, tmp_path / "again.mcap")).altered() == []
+
+
+def test_what_another_tool_notes_is_no_digest_and_no_metadata_of_ours(
+    flown: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "noted.mcap"
+    note = record_bytes(Metadata("robotics.tags", {"/truth": "good"}))
+    whole = flown.read_bytes()
+    path.write_bytes(whole[:8] + note + whole[8:])
+    assert Log(path).metadata == METADATA
+    assert Log(path).altered() == []
 
 
 @pytest.mark.parametrize("topic", ["/state", "/truth"])

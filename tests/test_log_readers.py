@@ -20,16 +20,19 @@ from log_samples import (
     UNITS,
     create,
     fly,
+    rewritten,
     rows,
     write_block,
 )
 from mcap.opcode import Opcode
 from mcap.reader import NonSeekingReader, make_reader
-from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+from mcap.records import Chunk, DataEnd, Message
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.log_reader import Log
+from mjspace.log_writer import LogWriter
 
 RERUN = Path(sys.executable).with_name("rerun")
 
@@ -76,10 +79,11 @@ def test_frames_are_where_the_bodies_were(messages: dict[str, list[Any]]) -> Non
             assert frame.timestamp.ToNanoseconds() == message.log_time
             place = frame.translation
             assert (place.x, place.y, place.z) == (factor * t, -factor * t, 0.0)
-        sign = bus.rotation.w / wheel.rotation.w
-        assert sign == -1.0
-        assert (bus.rotation.w, bus.rotation.z) == (np.cos(t), np.sin(t))
-        assert bus.rotation.x == bus.rotation.y == 0.0
+        assert message.sequence == 0  # the frames are not counted, as the periods are
+        turn = (np.cos(t), *(np.sin(t) * np.array([0.36, 0.48, 0.8])))
+        for frame, sign in ((bus, 1.0), (wheel, -1.0)):
+            found = (frame.rotation.w, frame.rotation.x, frame.rotation.y, frame.rotation.z)
+            assert found == tuple(sign * number for number in turn)
     stamps = [message.log_time for message, _ in messages["/tf"]]
     assert len(stamps) == sum(-(-count // 10) for count in BLOCKS)
 
@@ -87,6 +91,7 @@ def test_frames_are_where_the_bodies_were(messages: dict[str, list[Any]]) -> Non
 def test_the_scene_and_the_events_are_foxgloves(messages: dict[str, list[Any]]) -> None:
     ((message, scene),) = messages["/scene"]
     assert (message.log_time, [entity.id for entity in scene.entities]) == (0, ["bus"])
+    assert message.sequence == 0  # not counted, as the periods are
     events = [decoded for _, decoded in messages["/events"]]
     assert [event.level for event in events] == [3] * len(BLOCKS)  # WARNING
     assert events[0].message == "period 3"
@@ -127,7 +132,11 @@ def test_the_summary_agrees_with_the_data(flown: Path) -> None:
     statistics = summary.statistics
     assert statistics.channel_message_counts == counts
     assert statistics.message_count == sum(counts.values())
+    assert statistics.message_start_time == 0
     assert statistics.message_end_time == (sum(BLOCKS) - 1) * 1_000_000
+    assert statistics.metadata_count == len(summary.metadata_indexes) == 2
+    assert statistics.attachment_count == len(summary.attachment_indexes) == len(ATTACHMENTS)
+    assert statistics.channel_count == statistics.schema_count == len(counts)
     assert statistics.chunk_count == len(summary.chunk_indexes) == len(BLOCKS)
     channels = {channel.topic: channel for channel in summary.channels.values()}
     assert channels["/state"].metadata["shape.law_p"] == "2,3"
@@ -142,6 +151,97 @@ def test_the_summary_says_when_a_flight_from_the_middle_began(tmp_path: Path) ->
     assert summary is not None
     assert summary.statistics is not None
     assert summary.statistics.message_start_time == 5_000_000_000
+    with (tmp_path / "flight.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        ((*_, message, decoded),) = reader.iter_decoded_messages(["/tf"])
+    # Whole seconds and the rest are two numbers in a frame.
+    assert {frame.timestamp.ToNanoseconds() for frame in decoded.transforms} == {message.log_time}
+
+
+def test_the_summary_of_a_flight_of_no_period_has_no_span(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    create(path).close()
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    statistics = summary.statistics
+    assert (statistics.message_start_time, statistics.message_end_time) == (0, 0)
+    assert (statistics.message_count, statistics.chunk_count) == (0, 0)
+    assert Log(path).complete
+    assert (len(Log(path)), Log(path).events()) == (0, [])
+
+
+@pytest.mark.parametrize("attachments", [ATTACHMENTS, {}])
+def test_the_summarys_offsets_divide_it_by_kinds_of_record(
+    attachments: dict[str, tuple[str, bytes]], tmp_path: Path
+) -> None:
+    path = tmp_path / "flight.mcap"
+    with LogWriter(path, TOPICS, METADATA, attachments, SCENE, UNITS) as log:
+        write_block(log, 0, 10)
+    content = path.read_bytes()
+    start, offsets_start = struct.unpack("<QQ", content[-28:-12])
+    place, kinds, at = start, [], offsets_start
+    while content[at] == Opcode.SUMMARY_OFFSET:
+        opcode, group_start, length = struct.unpack("<BQQ", content[at + 9 : at + 26])
+        assert group_start == place
+        kinds.append(opcode)
+        place, at = place + length, at + 26
+        inner = group_start
+        while inner < place:  # no record of another kind, and none beyond the group's end
+            assert content[inner] == opcode
+            inner += 9 + int.from_bytes(content[inner + 1 : inner + 9], "little")
+        assert inner == place > group_start
+    assert (place, content[at]) == (offsets_start, Opcode.FOOTER)
+    assert len(set(kinds)) == len(kinds) == (6 if attachments else 5)
+
+
+def test_the_summary_says_where_each_attachment_is_and_when_is_no_wall_clock(flown: Path) -> None:
+    content = flown.read_bytes()
+    with flown.open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        attached = {a.name: a for a in reader.iter_attachments()}
+    assert summary is not None
+    for index in summary.attachment_indexes:
+        record = attached[index.name]
+        assert content[index.offset] == Opcode.ATTACHMENT
+        assert int.from_bytes(content[index.offset + 1 :][:8], "little") == index.length - 9
+        assert (index.data_size, index.media_type) == (len(record.data), record.media_type)
+        # A log is the same whenever it is flown.
+        assert {index.log_time, index.create_time, record.log_time, record.create_time} == {0}
+
+
+def test_what_follows_the_data_has_no_checksum_that_could_be_wrong(flown: Path) -> None:
+    with flown.open("rb") as file:
+        records = list(StreamReader(file, emit_chunks=True).records)
+    (end,) = [record for record in records if isinstance(record, DataEnd)]
+    assert end.data_section_crc == 0  # the specification: not computed
+
+
+def test_the_summary_agrees_with_each_chunk(flown: Path) -> None:
+    with flown.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        file.seek(0)
+        chunks = [r for r in StreamReader(file, emit_chunks=True).records if isinstance(r, Chunk)]
+    assert summary is not None
+    content = flown.read_bytes()
+    for chunk, index in zip(chunks, summary.chunk_indexes, strict=True):
+        assert content[index.chunk_start_offset] == Opcode.CHUNK
+        after = index.chunk_start_offset + index.chunk_length
+        assert content[after] == Opcode.MESSAGE_INDEX
+        end = after + index.message_index_length
+        while after < end:
+            assert content[after] == Opcode.MESSAGE_INDEX
+            after += 9 + int.from_bytes(content[after + 1 : after + 9], "little")
+        assert after == end
+        assert content[end] in (Opcode.CHUNK, Opcode.METADATA)
+        assert index.compressed_size == len(chunk.data)
+        assert index.uncompressed_size == chunk.uncompressed_size
+        times = [m.log_time for m in breakup_chunk(chunk, True) if isinstance(m, Message)]
+        span = min(times), max(times)
+        assert (index.message_start_time, index.message_end_time) == span
+        assert (chunk.message_start_time, chunk.message_end_time) == span
 
 
 def test_the_summarys_checksum_covers_it_and_the_footer(flown: Path) -> None:
@@ -228,6 +328,53 @@ def test_a_copy_by_another_writer_reads_the_same(flown: Path, tmp_path: Path) ->
         assert {name: column.tobytes() for name, column in theirs.read(topic).items()} == {
             name: column.tobytes() for name, column in wanted.items()
         }
+
+
+def test_a_copy_in_one_chunk_is_read_also_when_its_summary_is_cut_off(
+    flown: Path, tmp_path: Path
+) -> None:
+    # Its schemas and channels are in the chunk too, among the messages that are looked for there.
+    path = rewritten(flown, tmp_path / "copy.mcap")
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    (chunk,) = summary.chunk_indexes
+    whole = Log(path).read("/state")
+    assert len(whole["time"]) == sum(BLOCKS)
+    content = path.read_bytes()
+    declarations = content[int.from_bytes(content[-28:-20], "little") : -8]
+    end = chunk.chunk_start_offset + chunk.chunk_length
+    path.write_bytes(
+        content[: chunk.chunk_start_offset]
+        + declarations_of(declarations)
+        + content[chunk.chunk_start_offset : end]
+    )
+    cut = Log(path)
+    assert not cut.complete
+    assert {name: c.tobytes() for name, c in cut.read("/state").items()} == {
+        name: c.tobytes() for name, c in whole.items()
+    }
+
+
+def declarations_of(summary: bytes) -> bytes:
+    """Return the Schema and Channel records of a summary."""
+    found, at = b"", 0
+    while at < len(summary):
+        size = 9 + int.from_bytes(summary[at + 1 : at + 9], "little")
+        if summary[at] in (Opcode.SCHEMA, Opcode.CHANNEL):
+            found += summary[at : at + size]
+        at += size
+    return found
+
+
+def test_an_uncompressed_copy_is_read_and_another_compression_named(
+    flown: Path, tmp_path: Path
+) -> None:
+    plain = rewritten(flown, tmp_path / "plain.mcap", compression=CompressionType.NONE)
+    assert Log(plain).altered() == []
+    packed = rewritten(flown, tmp_path / "packed.mcap", compression=CompressionType.LZ4)
+    with pytest.raises(ValueError, match=r"packed.mcap: compression 'lz4': write the log anew"):
+        Log(packed).read("/truth")
 
 
 @pytest.mark.skipif(not RERUN.exists(), reason="rerun-sdk is not installed")

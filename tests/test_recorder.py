@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from time import sleep
 from typing import Any
 
 import mujoco
@@ -15,6 +16,7 @@ from mjspace.assembly import Assembly
 from mjspace.contract import Measurement, Reference
 from mjspace.flight import run
 from mjspace.loading import load
+from mjspace.log_chunk import encode
 from mjspace.log_reader import Log
 from mjspace.plant import from_bytes
 from mjspace.replay import assembly_of
@@ -142,6 +144,17 @@ def test_the_verdict_stands_at_the_end_of_the_log(log: Log) -> None:
     assert (verdict.time, verdict.level) == (0.1, "INFO")
     assert verdict.message.startswith("PASS late: ")
     assert log.complete
+
+
+def test_a_verdict_waits_for_a_slow_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def slow(parts: Any, position: int) -> Any:
+        sleep(0.1)
+        return encode(parts, position)
+
+    monkeypatch.setattr("mjspace.log_file.encode", slow)
+    check = "checks=[{name='turns',signal='truth.rate',below=9}]"
+    flown = run("detumble-wheels", overrides=["duration=0.02", "events=[]", check], out=tmp_path)
+    assert [verdict.line[:11] for verdict in flown.verdicts] == ["PASS turns:"]
 
 
 DIMENSIONLESS = {"attitude", "contact", "foot_contact", "hull_contact", "crash", "time"}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from mjspace.components import load_object
 from mjspace.contract import Measurement
@@ -79,6 +80,10 @@ def test_a_log_of_a_law_of_several_files_is_flown_again_without_them(tmp_path: P
         *("law/damper.py", "law/helpers.py", "law/gain.csv"),
         *("law/tools/__init__.py", "law/tools/scale.py", "law/tools/factor.py"),
     }
+    with path.open("rb") as stream:
+        types = {a.name: a.media_type for a in make_reader(stream).iter_attachments()}
+    assert types["law/helpers.py"] == "text/x-python"
+    assert types["law/gain.csv"] == "application/octet-stream"
     assert verify(path) is None
     with assembly_of(log) as built:  # not reset again where it has no state
         assert start_of(log, built, 0.05).law == ()

@@ -54,7 +54,7 @@ GUARDS = {
     "mjspace/log_reader.py": LOG,
     "mjspace/log_schema.py": LOG,
     "mjspace/log_writer.py": LOG,
-    "mjspace/recorder.py": ("test_recorder.py",),
+    "mjspace/recorder.py": ("test_recorder.py", "test_user_files.py"),
     "mjspace/tape.py": ("test_tape.py", "test_blocks.py", "test_recorder.py", "test_crossings.py"),
     "mjspace/replay.py": ("test_replay.py", "test_api.py", "test_user_files.py"),
     "mjspace/checks.py": ("test_checks.py", "test_verdict.py"),
