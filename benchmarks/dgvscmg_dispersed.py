@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from mjspace.controllers.dgvscmg import Cascade
-from mjspace.controllers.rate_references import Sinusoids
+from mjspace.controllers.cmg.dgvscmg import Cascade
+from mjspace.controllers.references.rate_references import Sinusoids
 
-from mjspace.assembly import Assembly, assemble
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.contract import Array, Measurement, Reference
-from mjspace.environment import userdata
-from mjspace.loading import load
-from mjspace.simulation import fly
-from mjspace.start import Start, first_start, last_period
-from mjspace.tables import Ripple
-from mjspace.tape import Columns
+from mjspace.environment.install import userdata
+from mjspace.scenario.loading import load
+from mjspace.simulation.loop import fly
+from mjspace.simulation.initial_state import Start, first_start, last_period
+from mjspace.scenario.plant import Ripple
+from mjspace.simulation.recording import Columns
 
 SCENARIO = "dgvscmg-low-momentum"  # for its limits and its wheel's motor
 SEED = 20260401

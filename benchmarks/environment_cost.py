@@ -12,9 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace import environment, plant
-from mjspace.environment_tables import DisturbanceTorque, Environment, Orbit, Sine
-from mjspace.tables import PlantTable, Rates
+from mjspace.environment import install
+from mjspace.vehicle import vehicle
+from mjspace.scenario.environment import DisturbanceTorque, Environment, Orbit, Sine
+from mjspace.scenario.plant import PlantTable, Rates
 
 ORBIT = Orbit(semi_major_axis=7.0e6, eccentricity=0.01, inclination=0.9)
 TORQUE = DisturbanceTorque(
@@ -36,7 +37,7 @@ def vehicle_state(model: Any, outside: Environment | None) -> Any:
     data = mujoco.MjData(model)
     data.qpos[3:7], data.qvel[3:6], data.qvel[6:] = [0.8, -0.2, 0.4, 0.4], [0.01, 0.02, 0.03], 50.0
     if outside is not None:
-        data.userdata[:] = environment.userdata(model, outside, {})
+        data.userdata[:] = install.userdata(model, outside, {})
     return data
 
 
@@ -47,8 +48,8 @@ def microseconds_per_step(model: Any, data: Any) -> float:
 
 
 def main() -> None:
-    size = max(environment.userdata_size(outside, {}) for outside in CASES.values())
-    model = plant.build(PlantTable(), Rates(), userdata=size).model
+    size = max(install.userdata_size(outside, {}) for outside in CASES.values())
+    model = vehicle.build(PlantTable(), Rates(), userdata=size).model
     print(f"mujoco {mujoco.__version__}, RK4, {PAIRS} pairs of {STEPS} steps of 1 ms")
     print(f"{'environment':<26}{'bare':>9}{'with':>9}{'ratio':>8}   (us per step, medians)")
     for name, outside in CASES.items():
@@ -58,7 +59,7 @@ def main() -> None:
             mujoco.set_mjcb_passive(None)
             mujoco.set_mjcb_sensor(None)
             without = microseconds_per_step(model, bare)
-            environment.install()
+            install.install()
             times.append((without, microseconds_per_step(model, acted_on)))
         pairs = np.array(times)
         without, acted = np.median(pairs, axis=0)

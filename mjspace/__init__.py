@@ -10,11 +10,11 @@ from typing import Any
 __version__ = "0.1.0"
 
 _PLACES = {
-    "load": "mjspace.loading",
-    "run": "mjspace.flight",
-    "replay": "mjspace.replay",
-    "verify": "mjspace.replay",
-    "Log": "mjspace.log_reader",
+    "load": "mjspace.scenario.loading",
+    "run": "mjspace.runner.run",
+    "replay": "mjspace.runner.replay",
+    "verify": "mjspace.runner.replay",
+    "Log": "mjspace.log.reader",
 }
 
 __all__ = ["Log", "load", "replay", "run", "verify"]

@@ -12,10 +12,10 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from mjspace import graphics
+from mjspace.rendering import graphics
 from mjspace.errors import InputError
-from mjspace.options import Json, LogFile, Out, Plot, Set, Traceback, Video
-from mjspace.terminal import (
+from mjspace.terminal.options import Json, LogFile, Out, Plot, Set, Traceback, Video
+from mjspace.terminal.terminal import (
     finish,
     in_full,
     open_log,
@@ -45,7 +45,7 @@ def main() -> None:
 @app.command("list")
 def list_scenarios(as_json: Json = False) -> None:
     """List the scenarios that come with mjspace."""
-    from mjspace.loading import load, scenario_names
+    from mjspace.scenario.loading import load, scenario_names
 
     found = {name: load(name)[0].description for name in scenario_names()}
     if as_json:
@@ -64,7 +64,7 @@ def info(
 ) -> None:
     """Show a scenario in full, or what a log holds."""
     if target.endswith(".mcap"):
-        from mjspace import report
+        from mjspace.runner import report
 
         log = open_log(Path(target))
         if as_json:
@@ -72,7 +72,7 @@ def info(
         else:
             report.print_log(log)
         return
-    from mjspace.loading import load, to_toml
+    from mjspace.scenario.loading import load, to_toml
 
     scenario, _ = load(target, overrides)
     print(scenario.model_dump_json(indent=2) if as_json else to_toml(scenario).rstrip())
@@ -96,9 +96,9 @@ def run(
     traceback: Traceback = False,
 ) -> None:
     """Fly a scenario, log it and judge it."""
-    from mjspace.assembly import assemble
-    from mjspace.flight import fly_to_log, output_folder
-    from mjspace.loading import load
+    from mjspace.simulation.assembly import assemble
+    from mjspace.runner.run import fly_to_log, output_folder
+    from mjspace.scenario.loading import load
 
     extra = [] if seed is None else [f"seed={seed}"]
     extra += [f"duration={duration}"] if duration else []
@@ -118,8 +118,8 @@ def run(
 
 
 def _run_all(overrides: list[str], out: Path, as_json: bool) -> NoReturn:
-    from mjspace import every
-    from mjspace.loading import scenario_names
+    from mjspace.runner import run_all as every
+    from mjspace.scenario.loading import scenario_names
 
     with progress_bar(1.0, "flying", count="") as progress:
         outcomes = every.fly(scenario_names(), overrides, out, progress)
@@ -153,9 +153,9 @@ def replay(
     traceback: Traceback = False,
 ) -> None:
     """Fly a log again: to prove it, or under another law."""
-    from mjspace import replay as again
-    from mjspace.flight import output_folder
-    from mjspace.loading import component
+    from mjspace.runner import replay as again
+    from mjspace.runner.run import output_folder
+    from mjspace.scenario.loading import component
 
     if gains and not law:
         raise InputError("--gain: goes with --law")
@@ -194,7 +194,7 @@ def render(
 ) -> None:
     """Render a log to a video or a picture, offscreen."""
     from mjspace.errors import blamed_on
-    from mjspace.render import render as to_picture
+    from mjspace.rendering.render import render as to_picture
 
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit()):
@@ -227,16 +227,16 @@ def plot(
     ] = None,
 ) -> None:
     """Plot a log to a PNG page."""
-    from mjspace import phase_plot
+    from mjspace.plotting import phase_plane
     from mjspace.errors import InputError, blamed_on
-    from mjspace.plot import plot as to_picture
+    from mjspace.plotting.page import plot as to_picture
 
     if phase and signals:
         raise InputError("--phase: is a picture of its own: leave --signal out")
     open_log(log)
     with blamed_on("plot"):
         if phase:
-            phase_plot.plot(log, output, *phase)
+            phase_plane.plot(log, output, *phase)
         else:
             to_picture(log, output, signals=signals)
     print(output)

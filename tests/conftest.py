@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from mjspace.flight import run
+from mjspace.runner.run import run
 
 # The same examples on every run where a failure could not be told from a change.
 settings.register_profile("ci", derandomize=True)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from mjspace.controllers.lander import VariableStructure
+from mjspace.controllers.landing.lander import VariableStructure
 
 PRINTED = VariableStructure(
     coordinates="polar",

@@ -12,9 +12,9 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from mjspace.contract import Array
-from mjspace.log_layout import Fields
-from mjspace.log_schema import Scene
-from mjspace.log_writer import LogWriter
+from mjspace.log.encoding import Fields
+from mjspace.log.schema import Scene
+from mjspace.log.writer import LogWriter
 
 TOPICS: dict[str, Fields] = {
     "/state": {"physics": (9,), "law_p": (2, 3), "sensor_none": (0,)},

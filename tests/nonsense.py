@@ -13,8 +13,8 @@ import mjspace.controllers
 import numpy as np
 from pydantic import BaseModel
 
-from mjspace.loading import load, scenario_names
-from mjspace.scenario import Component, Scenario
+from mjspace.scenario.loading import load, scenario_names
+from mjspace.scenario.scenario import Component, Scenario
 
 SCALARS = (math.nan, math.inf, -math.inf, -1.0, 0.0, 400.0, True, "7", "x")
 

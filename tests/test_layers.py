@@ -56,8 +56,8 @@ ONLY_IN = {
     "mcap": ("log_*",),
     "dm_control": ("dm_bridge",),
     "dm_env": ("environments",),
-    "mjspace.dm_bridge": ("environments",),
-    "mjspace.environments": (),  # imported only when asked for
+    "mjspace.dm_env.bridge": ("environments",),
+    "mjspace.dm_env.environment": (),  # imported only when asked for
     "mjspace.controllers": (),  # a scenario names its law, and the loader imports it
 }
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from mjspace.controllers.references import Hold
+from mjspace.controllers.references.references import Hold
 from oracle import Flight, fly, total_momentum
 
 from mjspace.contract import Measurement, Reference

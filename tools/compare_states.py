@@ -9,9 +9,9 @@ exits with 1 if there is any. Bytes are compared, so that -0.0 and 0.0 differ.
 import sys
 from pathlib import Path
 
-from mjspace.log_reader import Log
-from mjspace.replay import first_difference
-from mjspace.tape import Rows
+from mjspace.log.reader import Log
+from mjspace.runner.replay import first_difference
+from mjspace.simulation.recording import Rows
 
 
 def state(path: Path) -> Rows:

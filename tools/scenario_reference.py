@@ -13,8 +13,8 @@ from annotated_types import MaxLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from mjspace.fields import Si
-from mjspace.scenario import Scenario
+from mjspace.scenario.fields import Si
+from mjspace.scenario.scenario import Scenario
 
 PAGE = Path(__file__).parents[1] / "docs/scenario.md"
 HEAD = """# The scenario reference

@@ -5,10 +5,10 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from mjspace import workers
+from mjspace.runner import workers
 from mjspace.errors import InputError, blamed_on
-from mjspace.options import Json
-from mjspace.terminal import progress_bar
+from mjspace.terminal.options import Json
+from mjspace.terminal.terminal import progress_bar
 
 
 def validate(
@@ -42,7 +42,7 @@ def validate(
         _examine(model, out, as_json)
 
     workers.warm_up("mjspace.validation.benchmarks")
-    from mjspace.flight import output_folder
+    from mjspace.runner.run import output_folder
     from mjspace.validation import report, suite, table
     from mjspace.validation.basilisk import compared
 
@@ -62,10 +62,10 @@ def validate(
 
 def _examine(model: Path, out: Path | None, as_json: bool) -> NoReturn:
     """Print the passport of one model, and write it where a folder is named."""
-    from mjspace import mujoco_log
+    from mjspace.simulation import mujoco_warnings
     from mjspace.validation import passport, report, table
 
-    mujoco_log.silence()
+    mujoco_warnings.silence()
     with blamed_on(f"--model {model}"):
         issued = passport.issue(model)
     written = () if out is None else report.write_passport(issued, out)

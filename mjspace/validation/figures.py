@@ -9,7 +9,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from mjspace.plot_style import COLORS, FAINT, STYLE
+from mjspace.plotting.style import COLORS, FAINT, STYLE
 from mjspace.validation.benchmark import Integrator
 from mjspace.validation.results import Line, Section
 

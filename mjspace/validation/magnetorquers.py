@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from mjspace import kepler
-from mjspace.magnetic_field import dipole
+from mjspace.environment import kepler
+from mjspace.environment.dipole import dipole
 
 _HALF = 0.1  # s, of the central difference that is the field's change: good to (2 n HALF)^2 / 6
 

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from pydantic import computed_field
 
-from mjspace import guards, stability
+from mjspace.vehicle import model_checks, stability
 from mjspace.validation import convergence, model_files, model_ties
 from mjspace.validation.benchmark import Bound
 from mjspace.validation.conservation import MINUTE, Flight
@@ -97,9 +97,9 @@ def issue(path: Path) -> Passport:
 def _findings(source: Source, flight: Flight) -> Iterator[Finding]:
     model = source.model
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", guards.ModelWarning)
+        warnings.simplefilter("always", model_checks.ModelWarning)
         try:
-            guards.check(model)
+            model_checks.check(model)
         except ValueError as error:
             yield from (Finding(refused=True, text=line) for line in str(error).splitlines())
     end = flight.broken_off()

@@ -5,7 +5,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from mjspace import workers
+from mjspace.runner import workers
 from mjspace.validation import figures, wording
 from mjspace.validation.benchmark import FAULTS
 from mjspace.validation.passport import Passport

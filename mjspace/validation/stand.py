@@ -14,9 +14,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace import environment
+from mjspace.environment import install as environment
 from mjspace.contract import Array
-from mjspace.environment_tables import Environment
+from mjspace.scenario.environment import Environment
 from mjspace.validation.benchmark import Conditions, Fault
 
 Load = Callable[[Any, Any, float], Array]

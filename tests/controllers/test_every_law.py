@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from mjspace import attitude as att
-from mjspace.assembly import assemble
+from mjspace.simulation.assembly import assemble
 from mjspace.contract import Measurement, Reference
-from mjspace.loading import load, scenario_names
-from mjspace.simulation import fly
-from mjspace.start import first_start
+from mjspace.scenario.loading import load, scenario_names
+from mjspace.simulation.loop import fly
+from mjspace.simulation.initial_state import first_start
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 

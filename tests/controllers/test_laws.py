@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mjspace.controllers.contraction import Adaptive, Gradient, Ideal, IdealState
-from mjspace.controllers.immersion_invariance import ImmersionInvariance
-from mjspace.controllers.linear_quadratic import Regulator
-from mjspace.controllers.quaternion_feedback import RateDamping, Switched
-from mjspace.controllers.references import Hold, MultiAxis
+from mjspace.controllers.attitude.contraction import Adaptive, Gradient, Ideal, IdealState
+from mjspace.controllers.attitude.immersion_invariance import ImmersionInvariance
+from mjspace.controllers.attitude.linear_quadratic import Regulator
+from mjspace.controllers.attitude.quaternion_feedback import RateDamping, Switched
+from mjspace.controllers.references.references import Hold, MultiAxis
 from oracle import fly, wheel_speeds
 
 from mjspace import attitude as att

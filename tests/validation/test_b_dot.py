@@ -5,7 +5,7 @@ from scipy.integrate import solve_ivp
 
 from mjspace import attitude
 from mjspace.contract import Array
-from mjspace.magnetic_field import dipole
+from mjspace.environment.dipole import dipole
 from mjspace.validation.benchmarks.b_dot import (
     BALL,
     BODY,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mjspace.contract import Array
-from mjspace.environment_tables import Environment, Orbit
+from mjspace.scenario.environment import Environment, Orbit
 from mjspace.validation import meter, stand
 from mjspace.validation.benchmark import Conditions
 

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from scipy.integrate import simpson, solve_ivp
 
-from mjspace import attitude, kepler
+from mjspace import attitude
+from mjspace.environment import kepler
 from mjspace.constants import GM
 from mjspace.contract import Array
-from mjspace.environment_tables import Orbit
+from mjspace.scenario.environment import Orbit
 from mjspace.validation import stand
 from mjspace.validation.benchmark import (
     Benchmark,

@@ -7,7 +7,7 @@ from scipy.linalg import expm
 
 from mjspace import attitude
 from mjspace.contract import Array
-from mjspace.environment_tables import Environment
+from mjspace.scenario.environment import Environment
 from mjspace.validation import stand
 from mjspace.validation.benchmark import (
     Benchmark,

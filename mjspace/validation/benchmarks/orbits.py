@@ -5,7 +5,7 @@ import numpy as np
 from mjspace import attitude
 from mjspace.constants import GM
 from mjspace.contract import Array
-from mjspace.environment_tables import Environment, Orbit
+from mjspace.scenario.environment import Environment, Orbit
 from mjspace.validation import meter, stand
 from mjspace.validation.benchmark import (
     Benchmark,

@@ -1,0 +1,1 @@
+"""Attitude control laws with reaction wheels or ideal torques."""

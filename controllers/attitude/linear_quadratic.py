@@ -1,0 +1,209 @@
+"""Linear-quadratic attitude control with reaction wheels, infinite and finite horizon.
+
+R. Vazquez, "Tema 8: Control activo de la actitud", Universidad de Sevilla 2016 (paper 004). The
+state is x = [delta, a]: the rate less the wanted rate, and a = 2 dq_v / dq_0 of the error
+quaternion dq = conj(q_ref) q, which is the same for q and -q and has no value half a turn away.
+The torque u turns a bus of inertia I, which is without the wheels' axial inertia: I w' + w x I w
+= u. The wheels' absolute momentum h = sum a Jw (a.w + Omega) gives it by h' = -u + h x w, and -h'
+is what they do to the bus. All arrays may have leading vehicle axes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.linalg import solve_continuous_are
+
+from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
+
+from . import wheel_feedback_kernels as kernels
+from ..references.references import Regulation
+
+_TABLE_STEP = 0.1  # [s] between tabulated gains; 2e-9 of the largest, interpolated
+
+
+class State(NamedTuple):
+    """Memory of these laws: none."""
+
+
+class Signals(NamedTuple):
+    """What these laws show."""
+
+    a: Array
+    """Attitude error 2 dq_v / dq_0 [rad], (..., 3)."""
+    delta: Array
+    """Rate less the wanted rate, component by component [rad/s], (..., 3)."""
+    u: Array
+    """Torque wanted on the bus, that of h x w apart [N m], body axes, (..., 3)."""
+    h: Array
+    """Absolute momentum of the wheels [N m s], body axes, (..., 3)."""
+
+
+class Weights(NamedTuple):
+    """Of the cost: the integral of x^T Q x + u^T R u, without a factor of 1/2."""
+
+    Q: Array
+    """(6, 6); zero or more, and not zero on the angle (erratum 2)."""
+    R: Array
+    """(3, 3); more than zero (erratum 2)."""
+
+
+def axis_gains(
+    inertia: Array, rate_weight: Array, angle_weight: Array, torque_weight: Array
+) -> tuple[Array, Array]:
+    """Return (kw [N m s/rad], ka [N m/rad]) of u = -kw w - ka a on an axis by itself, (...).
+
+    The closed form of the Riccati equation for ``inertia`` a'' = u [kg m^2], weights as
+    ``Regulator``'s; what three principal axes get. A constant torque M leaves an angle of M / ka.
+    """
+    ka = np.sqrt(angle_weight / torque_weight)
+    kw = np.sqrt((rate_weight + 2.0 * inertia * torque_weight * ka) / torque_weight)
+    return kw, ka
+
+
+def steady_cost(inertia: Array, weights: Weights) -> Array:
+    """Return P (6, 6) of the algebraic Riccati equation: the cost from x on is x^T P x."""
+    A, B = linearized(inertia, np.zeros(3))
+    cost: Array = solve_continuous_are(A, B, *weights)
+    return cost
+
+
+def linearized(inertia: Array, rate: Array) -> tuple[Array, Array]:
+    """Return A (6, 6) and B (6, 3) of x' = A x + B du about a motion of ``rate`` [rad/s], (3,)."""
+    solve = np.linalg.inv(inertia)
+    A, B = np.zeros((6, 6)), np.zeros((6, 3))
+    A[:3, :3] = solve @ (_skew(inertia @ rate) - _skew(rate) @ inertia)
+    A[3:, :3] = np.eye(3)
+    A[3:, 3:] = -_skew(rate)
+    B[:3] = solve
+    return A, B
+
+
+def feedback(inertia: Array, weights: Weights, cost: Array) -> Array:
+    """Return K = -R^-1 B^T P (..., 3, 6) of u = K x, from the ``cost`` P (..., 6, 6)."""
+    _, B = linearized(inertia, np.zeros(3))
+    K: Array = -np.linalg.solve(weights.R, B.T) @ cost
+    return K
+
+
+def cost_to_go(
+    inertia: Array, weights: Weights, motion: Regulation, final: Array, time: Array
+) -> Array:
+    """Return P (n, 6, 6) at each ``time`` (n,) [s], rising, by the Riccati differential equation.
+
+    P is ``final`` (6, 6) at the last time, and is solved from there back to the first.
+    """
+    (Q, R), (_, B) = weights, linearized(inertia, np.zeros(3))
+    S = B @ np.linalg.solve(R, B.T)
+
+    def slope(t: float, flat: Array) -> Array:
+        A, _ = linearized(inertia, motion.at(np.array([t])).rate[0])
+        P = flat.reshape(6, 6)
+        return -(P @ A + A.T @ P - P @ S @ P + Q).ravel()
+
+    found = solve_ivp(
+        slope, (time[-1], time[0]), final.ravel(), method="DOP853", t_eval=time[::-1],
+        rtol=1e-9, atol=1e-10,
+    )  # fmt: skip
+    P: Array = found.y.T[::-1].reshape(-1, 6, 6)
+    return P
+
+
+@dataclass(frozen=True)
+class Regulator(Gains):
+    """Infinite horizon: u = u_ref + K x with one K, from the algebraic Riccati equation.
+
+    u_ref = I w_ref' + w_ref x I w_ref is zero for a reference at rest, for which it is meant.
+    """
+
+    batched: ClassVar[bool] = True
+
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
+    """I: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
+    wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
+    """Unit spin axes, body axes, one row for each wheel."""
+    wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
+    """Axial inertia of each wheel."""
+    rate_weight: Array = gain("s^2", (3,), default=(10.0, 10.0, 10.0), at_least=0.0)
+    """Of each squared rate in the cost."""
+    angle_weight: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0), above=0.0)
+    """Of each squared component of a."""
+    torque_weight: Array = gain("1/(N^2 m^2)", (3,), default=(1.0, 1.0, 1.0), above=0.0)
+    """Of each squared torque."""
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return the empty state."""
+        return State()
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, TorqueCommand, Signals]:
+        """Return the torque on the bus, -h', and what it is made of."""
+        seen, rate, wheel_speed, *_ = measurement
+        vehicle = (self.inertia, self.wheel_axes, self.wheel_inertia)
+        torque, *shown = kernels.linear(
+            seen, rate, *reference, wheel_speed, self.gain_at(time), *vehicle, self._full_rate
+        )
+        return state, TorqueCommand(torque), Signals(*shown)
+
+    def gain_at(self, time: float) -> Array:
+        """Return K (3, 6) of u = K [delta, a]."""
+        return self._steady
+
+    @property
+    def weights(self) -> Weights:
+        """Q and R."""
+        state = np.concatenate([self.rate_weight, self.angle_weight])
+        return Weights(np.diag(state), np.diag(self.torque_weight))
+
+    _full_rate: ClassVar[float] = 1.0
+
+    @cached_property
+    def _steady(self) -> Array:
+        return feedback(self.inertia, self.weights, steady_cost(self.inertia, self.weights))
+
+
+@dataclass(frozen=True)
+class Tracker(Regulator):
+    """Finite horizon, for one rest-to-rest turn: u = u_ref + K(t) x with h' = -u + h x w.
+
+    The Riccati differential equation is solved from the end of the turn back, once, and the gains
+    are kept in a table. At the end P is that of the regulator, whose gain then stays. The last
+    three gains must be those of the scenario's ``references:Regulation``. The lecture prints
+    h' = -u + h x delta (erratum 1), which leaves the torque h x w_ref to the feedback.
+    """
+
+    angle: float = gain("rad", default=0.5 * np.pi)
+    """Of the whole turn."""
+    duration: float = gain("s", default=60.0, above=0.0)
+    """From rest to rest: the horizon."""
+    axis: Array = gain(shape=(3,), default=(1.0, -2.0, 1.5), form="direction")
+    """Of the turn; normalized."""
+
+    def gain_at(self, time: float) -> Array:
+        """Return K (3, 6) of u = u_ref + K [delta, a]; after the turn it is the regulator's."""
+        K: Array = self._table(min(time, self.duration))
+        return K
+
+    @cached_property
+    def _table(self) -> CubicSpline:
+        motion = Regulation(self.angle, self.duration, self.axis)
+        final = steady_cost(self.inertia, self.weights)
+        time = np.linspace(0.0, self.duration, 1 + int(np.ceil(self.duration / _TABLE_STEP)))
+        P = cost_to_go(self.inertia, self.weights, motion, final, time)
+        return CubicSpline(time, feedback(self.inertia, self.weights, P))
+
+
+@dataclass(frozen=True)
+class PrintedTracker(Tracker):
+    """As ``Tracker``, with h' = -u + h x delta as printed (erratum 1): 10 deg off, or more."""
+
+    _full_rate: ClassVar[float] = 0.0
+
+
+def _skew(v: Array) -> Array:
+    """Return the matrix of v x."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

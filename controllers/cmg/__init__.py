@@ -1,0 +1,1 @@
+"""Control moment gyroscopes: steering laws and the cascades of the DGVSCMG."""

@@ -1,0 +1,108 @@
+"""Attitude control with a cluster of single-gimbal CMGs: PD+ and singularity-robust steering.
+
+The attitude law is the thesis' (5.9) of ``pd_plus``, with the momentum of bus and wheels; the
+steering is ``cmg_steering``'s; the gimbals have speed loops of their own. All arrays may have
+leading vehicle axes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from mjspace.contract import Array, Gains, GimbalRateCommand, Measurement, Reference, gain
+
+from . import cmg_steering
+from ..attitude import pd_plus, pd_plus_kernels
+
+
+class State(NamedTuple):
+    """Memory of this law: none."""
+
+
+class Signals(NamedTuple):
+    """What this law shows."""
+
+    sigma_e: Array
+    """Attitude error, modified Rodrigues parameters, (..., 3)."""
+    s: Array
+    """Composite error [rad/s], body axes, (..., 3)."""
+    torque: Array
+    """Wanted on the bus [N m], body axes, (..., 3)."""
+    measure: Array
+    """sqrt(det(A A^T)), zero in a singularity; at most 1.54 with four CMGs, (..., 1)."""
+    damping: Array
+    """lambda of the steering: zero where it makes the wanted torque exactly, (..., 1)."""
+
+
+@dataclass(frozen=True)
+class CmgCluster(Gains):
+    """PD+ wants the torque tau; d' = -A^T (A A^T + lambda E)^-1 tau / h0 makes it."""
+
+    batched: ClassVar[bool] = True
+
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
+    """M: of the whole vehicle, body axes."""
+    gimbal_axes: Array = gain(shape=("cmg", 3), form="unit vector")
+    """Unit, body axes."""
+    spin_axes: Array = gain(shape=("cmg", 3), form="unit vector")
+    """Of the wheels, unit, body axes, at gimbal angles of zero."""
+    wheel_inertia: Array = gain("kg m^2", ("cmg",), above=0.0)
+    """Axial, of each wheel."""
+    attitude_gain: float = gain("1/s", default=1.0, above=0.0)
+    """lam: with s = 0, sigma_e vanishes at this rate."""
+    rate_gain: float = gain("N m s/rad", default=20.0, above=0.0)
+    """Kc, the same on each axis."""
+    momentum: float = gain("N m s", default=2.0, above=0.0)
+    """h0: of one wheel; the unit of the measure."""
+    measure_wanted: float = gain(default=0.5, above=0.0)
+    """m0: below it the steering gives up exactness for bounded rates."""
+    damping: float = gain(default=0.01, at_least=0.0)
+    """lambda0: in a singularity. Zero is the pseudo-inverse, whose rates have no bound."""
+    dither: float = gain(default=0.3, at_least=0.0, below=0.5)
+    """e0: by which the robust inverse turns to and fro, out of a locked direction. Below 0.5, E is
+    positive definite."""
+    null_gain: float = gain("1/s", default=0.0, at_least=0.0)
+    """Of the motion that makes no torque, towards a larger measure."""
+    gimbal_rate_limit: float = gain("rad/s", default=np.inf, above=0.0, at_most=np.inf)
+    """Fastest that is asked for; all rates are lessened alike, so that the torque keeps its
+    direction."""
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return the empty state."""
+        return State()
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, GimbalRateCommand, Signals]:
+        """Return the gimbal rates and what they are made of."""
+        angle, speed = measurement.gimbal_angle, measurement.wheel_speed
+        of_wheels = cmg_steering.momentum(self._cluster, angle, speed)
+        torque, sigma_e, s = pd_plus.wanted_torque(
+            measurement.attitude,
+            measurement.rate,
+            pd_plus_kernels.rigid_momentum(self.inertia, measurement.rate) + of_wheels,
+            reference,
+            self.inertia,
+            self._attitude_gains,
+        )
+        rate, measure, damping = cmg_steering.steer(
+            self._cluster, torque, angle, speed, np.array([time]), self._steering_gains
+        )
+        fastest = np.max(np.abs(rate), axis=-1, keepdims=True)
+        rate = rate / np.maximum(fastest / self.gimbal_rate_limit, 1.0)
+        return state, GimbalRateCommand(rate), Signals(sigma_e, s, torque, measure, damping)
+
+    @cached_property
+    def _cluster(self) -> cmg_steering.Cluster:
+        return cmg_steering.Cluster(self.gimbal_axes, self.spin_axes, self.wheel_inertia)
+
+    @cached_property
+    def _attitude_gains(self) -> Array:
+        return np.array([self.attitude_gain, self.rate_gain, 0.0, 1.0])
+
+    @cached_property
+    def _steering_gains(self) -> Array:
+        steering = [self.momentum, self.measure_wanted, self.damping]
+        return np.array([*steering, self.dither, self.null_gain])

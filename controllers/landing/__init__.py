@@ -1,0 +1,1 @@
+"""Landing on one gimballed engine: guidance, control and estimation."""

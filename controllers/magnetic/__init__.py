@@ -1,0 +1,1 @@
+"""Magnetorquers: detumbling and unloading of wheels."""

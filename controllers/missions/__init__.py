@@ -1,0 +1,1 @@
+"""Flights in phases, under one law after another."""

@@ -1,0 +1,1 @@
+"""Control of permanent-magnet synchronous motors: current and speed loops, observers."""

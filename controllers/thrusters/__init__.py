@@ -1,0 +1,1 @@
+"""On/off thrusters: phase-plane laws, relays, pulses and allocation."""

@@ -1,0 +1,108 @@
+"""Attitude control with on/off thrusters on all axes: a torque, shared out, in pulses.
+
+A PD torque on the quaternion's vector part, with the reference's own torque fed forward, is shared
+out to thrusters by non-negative least squares, and their shares to pulses with what is left over
+carried to the next control period. With an ``attitude_gain`` of zero it only takes the rate away.
+Vázquez 2016 (paper 004) has the torque; sharing and pulses are in ``allocation``. All arrays may
+have leading vehicle axes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from mjspace import attitude as att
+from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
+
+from .allocation import effect, pulses, share, within
+from ..attitude.turn_kernels import turn
+
+
+class State(NamedTuple):
+    """What the law remembers."""
+
+    carry: Array
+    """On-time that is still to be fired by each thruster [s], (..., n)."""
+
+
+class Signals(NamedTuple):
+    """What the law shows."""
+
+    angle: Array
+    """Rotation vector from where the body should be [rad], body axes, (..., 3)."""
+    angle_rate: Array
+    """Rate less the wanted rate [rad/s], body axes, (..., 3)."""
+    torque: Array
+    """That is asked for [N m], body axes, (..., 3)."""
+    shares: Array
+    """Of the period that each thruster should be on, (..., n)."""
+
+
+@dataclass(frozen=True)
+class PulsedPd(Gains):
+    """tau = -kp sin(|a|/2) a/|a| - kd w_e + H alpha + w x H w, by thrusters."""
+
+    batched: ClassVar[bool] = True
+
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
+    """H: of the vehicle, body axes."""
+    thruster_positions: Array = gain("m", ("thruster", 3))
+    """From the centre of mass, body axes, (n, 3)."""
+    thruster_directions: Array = gain(shape=("thruster", 3), form="unit vector")
+    """Of the force on the vehicle, body axes, (n, 3)."""
+    thruster_force: Array = gain("N", ("thruster",), above=0.0)
+    """Of each, (n,)."""
+    control_period: float = gain("s", above=0.0)
+    attitude_gain: float = gain("N m", at_least=0.0)
+    """kp: half of it is the stiffness against small angles."""
+    rate_gain: float = gain("N m s/rad", at_least=0.0)
+    """kd, the same on each axis."""
+    thruster_minimum_on: float = gain("s", default=0.0, at_least=0.0)
+    """What is less is not fired but carried over."""
+    force_weight: float = gain("m", default=1.0, at_least=0.0)
+    """Of a push that nobody asked for, against a wrong torque; zero lets it push."""
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return that nothing is carried over."""
+        none = np.zeros((*measurement.rate.shape[:-1], len(self.thruster_force)))
+        return State(none)
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, PulseCommand, Signals]:
+        """Return the on-times of this period, and what is behind them."""
+        angle, slip = turn(measurement, reference, np.eye(3))
+        torque = self._torque(angle, slip, measurement.rate, reference)
+        wanted = np.concatenate([torque, np.zeros_like(torque)], axis=-1)
+        shares, _ = within(share(wanted, self._effects))
+        on_time, carry = pulses(shares, state.carry, self.control_period, self.thruster_minimum_on)
+        return State(carry), PulseCommand(on_time), Signals(angle, slip, torque, shares)
+
+    def _torque(self, angle: Array, slip: Array, rate: Array, reference: Reference) -> Array:
+        half = 0.5 * np.linalg.norm(angle, axis=-1, keepdims=True)
+        vector = 0.5 * np.sinc(half / np.pi) * angle
+        to_body = att.from_rotation_vector(-angle)
+        # The wanted acceleration, as the body's axes see it turn past.
+        acceleration = att.rotate(to_body, reference.acceleration) - np.cross(rate, rate - slip)
+        torque: Array = (
+            -self.attitude_gain * vector
+            - self.rate_gain * slip
+            + self._times_inertia(acceleration)
+            + np.cross(rate, self._times_inertia(rate))
+        )
+        return torque
+
+    def _times_inertia(self, vector: Array) -> Array:
+        # BLAS may round one vehicle's product differently in a batch than alone.
+        product: Array = (self.inertia * vector[..., None, :]).sum(axis=-1)
+        return product
+
+    @cached_property
+    def _effects(self) -> Array:
+        weights = np.repeat([1.0, self.force_weight], 3)
+        found: Array = weights[:, None] * effect(
+            self.thruster_positions, self.thruster_directions, self.thruster_force
+        )
+        return found

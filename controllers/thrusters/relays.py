@@ -1,0 +1,152 @@
+"""Relays that fire on/off thrusters for each axis: what the laws of the phase plane share.
+
+A relay is electronics and no program: it is evaluated in every integration step, in ``inner``, and
+switches half of one late on average, whatever the control period is. All
+arrays may have leading vehicle axes; m is the number of axes.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from mjspace import attitude as att
+from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
+
+from .allocation import effect, pattern
+from ..attitude.turn_kernels import turn
+
+TICK = 1e-9
+"""s: what is left of a pulse that is over."""
+
+
+class State(NamedTuple):
+    """What a law remembers."""
+
+    memory: Array
+    """Of each axis, (..., m, k): its own docstring says what."""
+
+
+class Aim(NamedTuple):
+    """What the relays are told at a control instant, and what they command then."""
+
+    attitude: Array
+    """Of the desired axes, as a quaternion to inertial axes, (..., 4)."""
+    rate: Array
+    """Of the desired axes, in these axes [rad/s], (..., 3)."""
+    acceleration: Array
+    """Of the desired axes [rad/s^2], (..., 3): held until the next control instant."""
+    on_time: Array
+    """Of each thruster in the integration step that begins [s], (..., n)."""
+
+
+class Signals(NamedTuple):
+    """What a law shows."""
+
+    angle: Array
+    """a: of the body from where it should be, about each axis [rad], (..., m)."""
+    angle_rate: Array
+    """a' [rad/s], (..., m)."""
+    firing: Array
+    """1.0 or -1.0 while thrusters turn it that way about an axis, else 0.0, (..., m)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhasePlane(Gains, ABC):
+    """What these laws have in common: thrusters for both senses of each axis."""
+
+    batched: ClassVar[bool] = True
+
+    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
+    """Of the vehicle, body axes."""
+    axes: Array = gain(shape=(None, 3), default=np.eye(3), form="unit vector")
+    """Those that are controlled, unit vectors in body axes, (m, 3)."""
+    thruster_positions: Array = gain("m", ("thruster", 3))
+    """From the centre of mass, body axes, (n, 3)."""
+    thruster_directions: Array = gain(shape=("thruster", 3), form="unit vector")
+    """Of the force on the vehicle, body axes, (n, 3)."""
+    thruster_force: Array = gain("N", ("thruster",), above=0.0)
+    """Of each, (n,)."""
+    control_period: float = gain("s", above=0.0)
+    inner_period: float = gain("s", above=0.0)
+    """For which a relay's state is held: the integration step."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        torques = self._effects[:3] @ self._patterns.swapaxes(1, 2)
+        one, other = np.einsum("mi,sim->sm", self.axes, torques)
+        if not np.allclose(one, -other, rtol=1e-9):
+            raise ValueError(f"the thrusters turn it by {one} N m one way, {-other} N m the other")
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """U of each axis [rad/s^2], (m,)."""
+        torques = self._effects[:3] @ self._patterns[0].T
+        moments = np.einsum("mi,ij,mj->m", self.axes, self.inertia, self.axes)
+        found: Array = np.einsum("mi,im->m", self.axes, torques) / moments
+        return found
+
+    @cached_property
+    def _effects(self) -> Array:
+        return effect(self.thruster_positions, self.thruster_directions, self.thruster_force)
+
+    @cached_property
+    def _patterns(self) -> Array:
+        """The thrusters' shares for a turn about each axis, and against it, (2, m, n)."""
+        ways = ([pattern(way * axis, self._effects) for axis in self.axes] for way in (1.0, -1.0))
+        return np.array(list(ways))
+
+    def reset(self, measurement: Measurement, reference: Reference) -> State:
+        """Return what is remembered at first."""
+        return State(self._recall(*turn(measurement, reference, self.axes)))
+
+    def step(
+        self, state: State, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[State, Aim, Signals]:
+        """Return what the relays aim at, and which way each axis is turned at this instant."""
+        angle, rate = turn(measurement, reference, self.axes)
+        _, firing, duration = self._decide(state.memory, angle, rate)
+        still = np.zeros_like(measurement.rate)
+        aim = Aim(
+            np.zeros_like(measurement.attitude) + reference.attitude,
+            still + reference.rate,
+            still + reference.acceleration,
+            self._on_time(firing, duration),
+        )
+        return state, aim, Signals(angle, rate, firing)
+
+    def inner(
+        self, state: State, time: float, command: Aim, measurement: Measurement
+    ) -> tuple[State, PulseCommand]:
+        """Return for how long each thruster is on in the integration step that begins."""
+        desired = Reference(command.attitude, command.rate, command.acceleration)
+        if command.rate.any() or command.acceleration.any():
+            since = time - self.control_period * np.floor(time / self.control_period + 1e-9)
+            gained = since * command.acceleration
+            turned = att.from_rotation_vector(since * (command.rate + 0.5 * gained))
+            attitude = att.multiply(command.attitude, turned)
+            desired = desired._replace(attitude=attitude, rate=command.rate + gained)
+        memory, firing, duration = self._decide(
+            state.memory, *turn(measurement, desired, self.axes)
+        )
+        return State(memory), PulseCommand(self._on_time(firing, duration))
+
+    def _on_time(self, firing: Array, duration: Array) -> Array:
+        forth = np.where(firing > 0.0, duration, 0.0)[..., None] * self._patterns[0]
+        back = np.where(firing < 0.0, duration, 0.0)[..., None] * self._patterns[1]
+        on_time: Array = np.minimum((forth + back).sum(axis=-2), self.inner_period)
+        return on_time
+
+    def _recall(self, angle: Array, rate: Array) -> Array:
+        """Return the first memory, (..., m, k)."""
+        return np.zeros((*angle.shape, 1))
+
+    @abstractmethod
+    def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
+        """Return (memory, which way to fire: 1, 0 or -1, for how long [s]), the latter (..., m)."""
+
+    def _whole(self, firing: Array) -> tuple[Array, Array, Array]:
+        """Return a decision that holds for the whole integration step; it is remembered."""
+        return firing[..., None], firing, np.full_like(firing, self.inner_period)

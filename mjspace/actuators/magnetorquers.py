@@ -1,0 +1,88 @@
+"""Magnetorquers: coils whose magnetic moment the field of the Earth turns, and with it the bus."""
+
+from dataclasses import dataclass, field
+from math import exp, inf
+from typing import Any, ClassVar
+
+import numpy as np
+from numba import guvectorize
+
+from mjspace.actuators.base import Fields, State
+from mjspace.contract import Array, Measurement
+
+
+@dataclass(frozen=True)
+class CoilSet:
+    """Coils that are all alike, with a pseudo-inverse allocation.
+
+    What they give is the moment; its torque, moment x field, is the environment's, and changes
+    with the attitude in every stage of the integrator.
+    """
+
+    axes: Array
+    """Unit axes in body axes, shape (n, 3)."""
+    dipole_limit: float = inf
+    """Largest moment of each [A m^2]."""
+    time_constant: float = 0.0
+    """With which each follows its command [s]."""
+    logged_as: ClassVar[str] = "magnetic_moment"
+    takes: ClassVar[Fields] = {"dipole": (3, "A m^2")}
+    acts_on: ClassVar[str] = "userdata"
+    allocation: Array = field(init=False, repr=False)
+    """Moments of the coils for each unit of the whole, shape (n, 3)."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "allocation", np.linalg.pinv(self.axes.T))
+
+    @property
+    def stateful(self) -> bool:
+        """Whether the moments lag."""
+        return self.time_constant > 0.0
+
+    def reset(self, vehicles: int) -> State:
+        """Return the coils without current: "coil_moment" (N, n) [A m^2], where they lag."""
+        return {"coil_moment": np.zeros((vehicles, len(self.axes)))} if self.stateful else {}
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, Array, Array]:
+        """Return (state, moment on the whole, nothing) for ``step`` [s]; moment (N, 3), body axes.
+
+        Of all that would give the command's ``dipole``, the moments are those of least norm, each
+        then cut to the limit and, where it lags, the mean over the step. A cut is no event: it is
+        how the B-dot law works.
+        """
+        before = state.get("coil_moment", np.zeros((len(truth.rate), len(self.axes))))
+        kept = exp(-step / self.time_constant) if self.stateful else 0.0
+        mean = (1.0 - kept) * self.time_constant / step
+        after, moment = _moments.ufunc(
+            command.dipole, before, self.allocation, self.axes, [self.dipole_limit, kept, mean]
+        )
+        return {"coil_moment": after} if self.stateful else {}, moment, np.zeros((len(moment), 0))
+
+    def seen(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth: coils show nothing."""
+        return truth
+
+
+# Products are written out: BLAS may round one vehicle's differently in a batch than alone.
+@guvectorize(
+    ["void(f8[:], f8[:], f8[:, :], f8[:, :], f8[:], f8[:], f8[:])"],
+    "(k),(n),(n,k),(n,k),(m)->(n),(k)",
+    cache=True,
+)
+def _moments(
+    wanted: Any, before: Any, allocation: Any, axes: Any, how: Any, after: Any, moment: Any
+) -> None:
+    limit, kept, mean = how[0], how[1], how[2]
+    for k in range(wanted.size):
+        moment[k] = 0.0
+    for i in range(before.size):
+        target = 0.0
+        for k in range(wanted.size):
+            target += allocation[i, k] * wanted[k]
+        target = min(max(target, -limit), limit)
+        after[i] = target + (before[i] - target) * kept
+        given = target + (before[i] - target) * mean
+        for k in range(wanted.size):
+            moment[k] += axes[i, k] * given

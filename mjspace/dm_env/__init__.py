@@ -1,0 +1,1 @@
+"""The scenarios as dm_control environments."""

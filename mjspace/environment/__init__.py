@@ -1,0 +1,1 @@
+"""The environment: gravity, magnetic field, disturbances, and the native callbacks for MuJoCo."""

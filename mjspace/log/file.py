@@ -1,0 +1,171 @@
+"""An MCAP file that grows by chunks, compressed and written by one background thread."""
+
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+from mjspace.log.chunk import Part, encode, record_bytes, sealed
+
+MAGIC = b"\x89MCAP0\r\n"
+"""What an MCAP file begins and ends with."""
+NAME = "mjspace"
+"""Of the metadata record, without which a file is no log of ours."""
+
+# Chunks that may wait for the disk; beyond them the flight waits, so that memory is flat.
+_IN_FLIGHT = 2
+
+
+class LogFile:
+    """An MCAP file open for writing; the next call raises what went wrong in the background."""
+
+    def __init__(
+        self,
+        path: Path,
+        schemas: Sequence[Schema],
+        channels: Sequence[Channel],
+        metadata: Mapping[str, str],
+        attachments: Mapping[str, tuple[str, bytes]],
+    ) -> None:
+        """Create ``path`` with everything that a reader needs before the first chunk.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        self._registry = {
+            Opcode.SCHEMA: record_bytes(*schemas),
+            Opcode.CHANNEL: record_bytes(*channels),
+        }
+        note = record_bytes(Metadata(NAME, dict(metadata)))
+        head = MAGIC + record_bytes(Header("", NAME))
+        self._metadata_indexes = [MetadataIndex(len(head), len(note), NAME)]
+        head += note + b"".join(self._registry.values())
+        indexes = []
+        for name, (media_type, data) in attachments.items():
+            record = record_bytes(Attachment(0, 0, name, media_type, data))
+            indexes.append(
+                AttachmentIndex(len(head), len(record), 0, 0, len(data), name, media_type)
+            )
+            head += record
+        self._attachment_indexes = indexes
+        self._statistics = Statistics(
+            attachment_count=len(attachments),
+            channel_count=len(channels),
+            channel_message_counts=Counter(),
+            chunk_count=0,
+            message_count=0,
+            message_end_time=0,
+            message_start_time=0,
+            metadata_count=1,
+            schema_count=len(schemas),
+        )
+        self._chunk_indexes = bytearray()
+        self._error: OSError | None = None
+        self._position = 0
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="log")
+        self._writing: deque[Future[None]] = deque()
+        self._file = path.open("wb", buffering=0)
+        try:
+            self._put(head)
+        except OSError:
+            self._file.close()
+            raise
+
+    def add_chunk(self, parts: Sequence[Part], then: Callable[[], None] = lambda: None) -> None:
+        """Have ``parts`` written as one chunk; waits when the disk is two chunks behind.
+
+        ``then`` is called by the thread that writes, after the chunk.
+        """
+        while self._writing and (self._writing[0].done() or len(self._writing) == _IN_FLIGHT):
+            self._writing.popleft().result()
+        self._writing.append(self._thread.submit(self._write_chunk, parts, then))
+
+    def flush(self) -> None:
+        """Wait until every chunk given so far is with the operating system."""
+        while self._writing:
+            self._writing.popleft().result()
+
+    def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
+        """Write a metadata record after every chunk given so far, unless the file is closed."""
+        if self._file.closed:
+            return
+        self.flush()
+        record = record_bytes(Metadata(name, dict(metadata)))
+        self._metadata_indexes.append(MetadataIndex(self._position, len(record), name))
+        self._statistics.metadata_count += 1
+        self._put(record)
+
+    def close(self) -> None:
+        """Write what still waits and the summary, and close the file; again does nothing."""
+        if self._file.closed:
+            return
+        try:
+            self.flush()
+            self._put(self._ending())
+        finally:
+            self._thread.shutdown()
+            self._file.close()
+
+    def _write_chunk(self, parts: Sequence[Part], then: Callable[[], None]) -> None:
+        data, index, counts = encode(parts, self._position)
+        self._put(data)
+        self._chunk_indexes += record_bytes(index)
+        self._count(index, counts)
+        then()
+
+    def _count(self, index: ChunkIndex, counts: Mapping[int, int]) -> None:
+        seen = self._statistics
+        earlier = seen.message_start_time if seen.chunk_count else index.message_start_time
+        seen.message_start_time = min(earlier, index.message_start_time)
+        seen.chunk_count += 1
+        seen.message_count += sum(counts.values())
+        seen.message_end_time = max(seen.message_end_time, index.message_end_time)
+        for channel, count in counts.items():
+            seen.channel_message_counts[channel] += count
+
+    def _put(self, data: bytes) -> None:
+        """Hand ``data`` to the operating system, all of it."""
+        if self._error:
+            raise self._error  # what follows a torn record could never be found
+        rest = memoryview(data)
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self._error = error
+            raise
+        self._position += len(data)
+
+    def _ending(self) -> bytes:
+        groups = {
+            **self._registry,
+            Opcode.STATISTICS: record_bytes(self._statistics),
+            Opcode.CHUNK_INDEX: bytes(self._chunk_indexes),
+            Opcode.METADATA_INDEX: record_bytes(*self._metadata_indexes),
+            Opcode.ATTACHMENT_INDEX: record_bytes(*self._attachment_indexes),
+        }
+        data_end = record_bytes(DataEnd(0))
+        start = self._position + len(data_end)
+        summary, offsets = b"", []
+        for opcode, group in groups.items():
+            if group:
+                offsets.append(SummaryOffset(opcode, start + len(summary), len(group)))
+            summary += group
+        footer = Footer(start, start + len(summary), 0)
+        return data_end + sealed(summary + record_bytes(*offsets), footer) + MAGIC

@@ -1,0 +1,18 @@
+"""The scenario that a log says was flown."""
+
+import tomllib
+
+from mjspace.scenario.loading import validate
+from mjspace.log.reader import Log
+from mjspace.scenario.scenario import Scenario
+
+
+def scenario_of(log: Log) -> Scenario:
+    """Return the scenario as flown, with every default and gain written out.
+
+    Raises:
+        ValueError: the log does not hold it, or it is not valid for this version of mjspace.
+    """
+    table = tomllib.loads(log.attachment("scenario.toml").decode())
+    table.pop("verdict", None)  # of logs from before checks said how they are expected to come out
+    return validate(table, f"the scenario in {log.path}", context={"flown": True})

@@ -1,0 +1,248 @@
+"""The log as it is read: NumPy arrays by topic and field, one chunk in memory at a time."""
+
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
+from itertools import chain
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from foxglove_schemas_protobuf.Log_pb2 import Log as LogMessage
+from numpy.typing import NDArray
+
+from mjspace.contract import Array
+from mjspace.log.digest import RowDigests
+from mjspace.log.index import ChunkPlace, inventory, read_attachment, read_messages
+from mjspace.log.encoding import HEADER, doubles
+from mjspace.log.schema import PERIODIC, field_names
+
+
+class Event(NamedTuple):
+    """An entry of /events."""
+
+    time: float
+    """Simulation time [s]."""
+    level: str
+    """``foxglove.Log``'s: DEBUG, INFO, WARNING, ERROR or FATAL."""
+    message: str
+
+
+class Log:
+    """A flight's log, whole or cut short: every chunk that was written completely is there.
+
+    Nothing stays open between calls. ``metadata``, ``complete`` (not cut short), ``topics`` (shapes
+    by periodic topic and field) and ``units`` (by topic and field, where one was given) are read at
+    once, everything else when it is asked for.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        """Open a log.
+
+        Raises:
+            OSError: the file cannot be read.
+            ValueError: it is no MCAP file, or no log of mjspace.
+        """
+        self.path = Path(path)
+        self._found = found = inventory(self.path)
+        self.metadata = found.metadata
+        self.complete = found.complete
+        self.topics: dict[str, dict[str, tuple[int, ...]]] = {}
+        self.units: dict[str, dict[str, str]] = {}
+        for topic in PERIODIC:
+            if topic in found.channels:
+                channel = found.channels[topic]
+                names = field_names(found.schemas[channel.schema_id].data)
+                self.topics[topic] = {
+                    name: tuple(
+                        int(size) for size in channel.metadata[f"shape.{name}"].split(",") if size
+                    )
+                    for name in names
+                }
+                units = {name: channel.metadata.get(f"unit.{name}", "") for name in names}
+                self.units[topic] = {name: unit for name, unit in units.items() if unit}
+
+    @property
+    def attachments(self) -> tuple[str, ...]:
+        """Names of the attachments."""
+        return tuple(self._found.attachments)
+
+    def attachment(self, name: str) -> bytes:
+        """Return an attachment's content.
+
+        Raises:
+            ValueError: there is none of that name.
+        """
+        if name not in self._found.attachments:
+            have = ", ".join(self.attachments) or "none"
+            raise ValueError(f"no attachment {name!r} in {self.path}: have {have}")
+        return read_attachment(self.path, self._found.attachments[name])
+
+    def __len__(self) -> int:
+        """Return the number of control periods."""
+        return int(self._ends[1]["sequence"]) + 1 if self._ends else 0
+
+    @property
+    def start(self) -> float:
+        """Time of the first control period [s]; ValueError when there is none."""
+        return float(self._some_ends[0]["log_time"]) / 1e9
+
+    @property
+    def end(self) -> float:
+        """Time of the last control period [s]; ValueError when there is none."""
+        return float(self._some_ends[1]["log_time"]) / 1e9
+
+    def blocks(
+        self,
+        topic: str,
+        fields: Sequence[str] | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        every: int = 1,
+    ) -> Iterator[dict[str, Array]]:
+        """Yield a periodic topic by chunks: ``time`` [s], shape (n,), and each field, (n, ...).
+
+        From ``start`` to ``end`` [s], both included, and of those rows the first and every
+        ``every``-th after it.
+
+        Raises:
+            ValueError: the log has no such topic or field, or a chunk is damaged.
+        """
+        names = self._fields(topic, fields)
+        first = 0 if start is None else max(round(start * 1e9), 0)
+        stop = 2**63 if end is None else max(round(end * 1e9) + 1, 0)
+        places = [c for c in self._found.chunks if c.end >= first and c.start < stop]
+        skip = 0
+        for rows in self._rows(topic, places):
+            stamps = rows["header"]["log_time"]
+            low, high = np.searchsorted(stamps, np.array([first, stop], np.uint64))
+            if low + skip < high:
+                yield _columns(rows[low + skip : high : every], names)
+            skip = (skip - (high - low)) % every
+
+    def read(
+        self,
+        topic: str,
+        fields: Sequence[str] | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        every: int = 1,
+    ) -> dict[str, Array]:
+        """Return the ``blocks`` of a topic as one: see there."""
+        blocks = list(self.blocks(topic, fields, start, end, every))
+        shapes = {"time": ()} | self.topics[topic]
+        return {
+            name: np.concatenate([np.empty((0, *shapes[name])), *(block[name] for block in blocks)])
+            for name in ("time", *self._fields(topic, fields))
+        }
+
+    def nearest(self, topic: str, time: float) -> dict[str, Array]:
+        """Return the row of a topic nearest to ``time`` [s]: ``time``, shape (), and every field.
+
+        Raises:
+            ValueError: the log has no such topic, no row, or a damaged chunk.
+        """
+        names = self._fields(topic, None)
+        places, stamp = self._found.chunks, round(time * 1e9)
+        # The rows on either side are in the last chunk that starts before ``time``, the one before
+        # it (an /events or /tf stamp may be all that starts it so early) or the one after it.
+        after = bisect_right(places, stamp, key=lambda place: place.start)
+        found = list(self._rows(topic, places[max(after - 2, 0) : after + 1]))
+        if not found:
+            raise ValueError(f"{self.path} holds nothing on {topic} near {time:g} s")
+        rows = np.concatenate(found)
+        best = np.abs(rows["header"]["log_time"].astype(np.int64) - stamp).argmin()
+        return _columns(rows[best], names)
+
+    def altered(self) -> list[str] | None:
+        """Return the topics whose rows are not those that were written, by the log's digests.
+
+        None: not known, as of a log that was cut short.
+
+        Raises:
+            ValueError: a chunk is damaged.
+        """
+        if not (self.complete and self._found.digests):
+            return None
+        found = RowDigests(self.topics)
+        for messages in self._messages(self.topics, self._found.chunks):
+            for topic, records in messages.items():
+                found.add_messages(topic, records)
+        now, written = found.by_topic(), self._found.digests
+        return [topic for topic in written | now if now.get(topic) != written.get(topic)]
+
+    def events(self) -> list[Event]:
+        """Return the entries of /events, in the order in which they were logged."""
+        events = []
+        for record in chain.from_iterable(self._records("/events", self._found.chunks)):
+            entry = LogMessage.FromString(record[HEADER.itemsize :])
+            time = entry.timestamp.ToNanoseconds() / 1e9
+            events.append(Event(time, LogMessage.Level.Name(entry.level), entry.message))
+        return events
+
+    @cached_property
+    def _ends(self) -> tuple[np.void, np.void] | None:
+        """Headers of the first and the last control period."""
+        topic, chunks = next(iter(self.topics), "/state"), self._found.chunks
+        for first in self._rows(topic, chunks):
+            last = next(self._rows(topic, reversed(chunks)))
+            return first["header"][0], last["header"][-1]
+        return None
+
+    def require_periods(self) -> None:
+        """Make sure that the log holds something of a flight.
+
+        Raises:
+            ValueError: it was cut short before its first chunk, or has no control period at all.
+        """
+        if self._ends is None:
+            cut = "" if self.complete else " was cut short before its first chunk: it"
+            raise ValueError(f"{self.path}{cut} holds no control period")
+
+    @property
+    def _some_ends(self) -> tuple[np.void, np.void]:
+        self.require_periods()
+        assert self._ends is not None
+        return self._ends
+
+    def _fields(self, topic: str, fields: Sequence[str] | None) -> Sequence[str]:
+        if topic not in self.topics:
+            raise ValueError(f"no topic {topic!r} in {self.path}: have {', '.join(self.topics)}")
+        known = self.topics[topic]
+        for name in fields or ():
+            if name not in known:
+                raise ValueError(
+                    f"no field {name!r} on {topic} in {self.path}: have {', '.join(known)}"
+                )
+        return list(known) if fields is None else fields
+
+    def _rows(self, topic: str, places: Iterable[ChunkPlace]) -> Iterator[NDArray[np.void]]:
+        """Yield the rows that each of ``places`` has on a periodic topic, where it has any."""
+        dtype = doubles(self.topics.get(topic, {})).record(0).dtype
+        for records in self._records(topic, places):
+            if any(len(record) != dtype.itemsize for record in records):
+                raise ValueError(f"{self.path}: {topic} is not laid out as mjspace writes it")
+            yield np.frombuffer(b"".join(records), dtype)
+
+    def _records(self, topic: str, places: Iterable[ChunkPlace]) -> Iterator[list[bytes]]:
+        for messages in self._messages([topic], places):
+            yield from messages.values()
+
+    def _messages(
+        self, topics: Iterable[str], places: Iterable[ChunkPlace]
+    ) -> Iterator[dict[str, list[bytes]]]:
+        """Yield the message records that each of ``places`` has on each of ``topics``, if any."""
+        channels = {self._found.channels[t].id: t for t in topics if t in self._found.channels}
+        with self.path.open("rb") as file:
+            for place in places:
+                try:
+                    messages = read_messages(file, place, channels)
+                except ValueError as error:
+                    raise ValueError(f"{self.path}: {error}") from None
+                yield {channels[number]: records for number, records in messages.items() if records}
+
+
+def _columns(rows: Any, names: Sequence[str]) -> dict[str, Array]:
+    # Copied, aligned and contiguous: a view would keep the whole chunk in memory.
+    columns = {name: np.array(rows["message"][name], float) for name in names}
+    return {"time": np.asarray(rows["header"]["log_time"] / 1e9)} | columns

@@ -1,0 +1,153 @@
+"""A log as a page of plots: how well it pointed, with what torques, and what the law thought."""
+
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from mjspace.plotting.check_bounds import Bound, bounds
+from mjspace.log.flown_scenario import scenario_of
+from mjspace.log.reader import Log
+from mjspace.plotting.panels import Curves, chosen, curves
+from mjspace.plotting.style import COLORS, FAINT, INK, STYLE
+from mjspace.scenario.scenario import Scenario
+
+# Inches: the page's width and edges, a panel and the space around it, head and foot.
+WIDTH, LEFT, RIGHT, PANEL, BETWEEN, HEAD, FOOT = 12.5, 0.7, 0.25, 1.75, 0.5, 1.05, 0.85
+
+
+def plot(log_path: Path | str, output: Path | str, *, signals: Sequence[str] = ()) -> None:
+    """Write a page of plots as PNG: the standard one, or one panel for each of ``signals``.
+
+    Signals are named as in a scenario's checks (``truth.rate[0]``). The log is never loaded whole:
+    a line has at most some 4000 points, the extremes among them.
+
+    Raises:
+        ValueError: ``output`` does not end in .png, no such signal, or no log of mjspace.
+        OSError: a file cannot be read or written.
+    """
+    output = Path(output)
+    if output.suffix != ".png":
+        raise ValueError(f"output {str(output)!r}: end it in .png")
+    with matplotlib.rc_context(STYLE):
+        figure(Log(log_path), signals).savefig(output, dpi=110, facecolor="white")
+
+
+def figure(log: Log, signals: Sequence[str] = ()) -> Figure:
+    """Return the page, as ``plot`` writes it but for the style."""
+    scenario = scenario_of(log)
+    found = list(chosen(log, signals) if signals else curves(log))
+    warnings = [e.time for e in log.events() if e.level in ("WARNING", "ERROR", "FATAL")]
+    rows = max(1, (len(found) + 1) // 2)
+    height = HEAD + rows * (PANEL + BETWEEN) - BETWEEN + FOOT
+    page = Figure(figsize=(WIDTH, height))
+    FigureCanvasAgg(page)
+    grid = page.subplots(rows, 2, squeeze=False, sharex=True)
+    page.subplots_adjust(
+        left=LEFT / WIDTH,
+        right=1.0 - RIGHT / WIDTH,
+        bottom=FOOT / height,
+        top=1.0 - HEAD / height,
+        hspace=BETWEEN / PANEL,
+        wspace=0.14,
+    )
+    for axes, one in zip(grid.flat, found, strict=False):
+        colors = _colors(one)
+        _draw(axes, one, colors)
+        for bound in bounds(one.panel, scenario.checks, log):
+            axes.margins(y=0.16)  # room for the bound's text
+            _mark(axes, bound, colors[bound.component if one.panel.part is None else 0])
+        # Saturation, an early end, a check that failed: ticks along the bottom.
+        axes.plot(
+            warnings,
+            np.zeros(len(warnings)),
+            "|",
+            color=COLORS[3],
+            markersize=7,
+            transform=axes.get_xaxis_transform(),
+            clip_on=False,
+        )
+    if log.end > log.start:
+        grid.flat[0].set_xlim(log.start, log.end)
+    for axes in grid.flat[len(found) :]:
+        axes.set_axis_off()
+    for axes in grid.flat[max(len(found) - 2, 0) : len(found)]:
+        axes.tick_params(labelbottom=True)
+        axes.set_xlabel("time [s]")
+    _caption(page, scenario, log, height)
+    return page
+
+
+def _colors(one: Curves) -> list[str]:
+    count = one.value.shape[1]
+    return [INK] if count == 1 else [COLORS[i % len(COLORS)] for i in range(count)]
+
+
+def _draw(axes: Any, one: Curves, colors: Sequence[str]) -> None:
+    panel, count = one.panel, len(colors)
+    for i, (name, color) in enumerate(zip(panel.names or range(count), colors, strict=True)):
+        axes.plot(one.time[:, i], one.value[:, i], color=color, label=str(name))
+        if one.wanted is not None and one.wanted_time is not None:
+            axes.plot(
+                one.wanted_time[:, i],
+                one.wanted[:, i],
+                color=color,
+                linewidth=2.6,
+                alpha=0.3,
+                zorder=1,
+                label="wanted" if i == count - 1 else None,
+            )
+    unit = f" [{panel.unit}]" if panel.unit else ""
+    axes.set_title(panel.title + unit, loc="left", fontweight="bold", fontsize=9.5)
+    if panel.log_scale:
+        axes.set_yscale("log")
+    else:
+        axes.yaxis.set_major_formatter(
+            lambda value, _: f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
+        )
+    if count > 1:
+        axes.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 0.98),
+            ncols=count + 1,
+            frameon=False,
+            handlelength=1.0,
+            columnspacing=0.9,
+            handletextpad=0.4,
+            borderpad=0.1,
+            fontsize=8,
+        )
+
+
+def _mark(axes: Any, bound: Bound, color: str) -> None:
+    dashes = (0, (4, 2))
+    axes.plot([bound.start, bound.end], [bound.value] * 2, color=color, lw=1.0, ls=dashes)
+    axes.annotate(
+        bound.text,
+        (bound.end, bound.value),
+        (0, 2 if bound.upper else -2),
+        textcoords="offset points",
+        ha="right",
+        va="bottom" if bound.upper else "top",
+        fontsize=7,
+        color=color,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+    )
+
+
+def _caption(page: Figure, scenario: Scenario, log: Log, height: float) -> None:
+    left = 0.15 / WIDTH
+    page.text(left, 1.0 - 0.15 / height, scenario.name, va="top", fontsize=14, fontweight="bold")
+    description = textwrap.shorten(scenario.description, 160, placeholder=" ...")
+    page.text(left, 1.0 - 0.47 / height, description, va="top", color="#5b6470")
+    version = log.metadata.get("mjspace", "")
+    parts = [f"law {scenario.law.kind}", f"{log.path.name}", f"mjspace {version}"]
+    if not log.complete:
+        parts.append("the log was cut short")
+    page.text(left, 0.14 / height, "  |  ".join(parts), va="bottom", fontsize=7.5, color=FAINT)

@@ -1,0 +1,48 @@
+"""What is written on a frame: whose flight it is, when, and how well it points."""
+
+from functools import cache
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from mjspace.contract import Array
+from mjspace.rendering.video import Frame
+
+WHITE, GREY, SHADE = (255, 255, 255, 255), (200, 208, 220, 255), (0, 0, 0, 96)
+
+
+def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> Frame:
+    """Return the frame with two lines of text in each lower corner, the upper ones larger.
+
+    Sizes follow the frame's height, down to what can still be read.
+    """
+    height, width = frame.shape[:2]
+    image = Image.fromarray(frame)
+    draw = ImageDraw.Draw(image, "RGBA")
+    margin, large, small = round(0.035 * height), max(11, height // 25), max(9, height // 36)
+    upper, lower = height - margin - round(1.45 * small), height - margin
+    draw.rectangle((0, upper - large - margin // 2, width, height), fill=SHADE)
+    for x, anchor, lines in ((margin, "ls", left), (width - margin, "rs", right)):
+        draw.text((x, upper), lines[0], WHITE, _font("DejaVuSans-Bold", large), anchor)
+        draw.text((x, lower), lines[1], GREY, _font("DejaVuSans", small), anchor)
+    return np.asarray(image)
+
+
+def angle_text(angle: float) -> str:
+    """Return an angle [rad] in degrees, to two decimals or, below those, two digits."""
+    degrees = float(np.degrees(angle))
+    return f"{degrees:.2f} deg" if degrees >= 0.01 else f"{degrees:.2g} deg"
+
+
+def path_text(position: Array, velocity: Array, error: Array) -> str:
+    """Return height [m], speed [m/s] and distance from the wanted path [m], of vectors (3,)."""
+    speed, off = float(np.linalg.norm(velocity)), float(np.linalg.norm(error))
+    return f"height {position[2]:.1f} m, speed {speed:.2f} m/s, {off:.2f} m off its path"
+
+
+@cache
+def _font(name: str, size: int) -> ImageFont.FreeTypeFont:
+    # matplotlib carries the only font that is on every machine.
+    return ImageFont.truetype(Path(matplotlib.get_data_path(), "fonts/ttf", f"{name}.ttf"), size)

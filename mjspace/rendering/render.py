@@ -1,0 +1,140 @@
+"""A log as a video or a picture: the model that is in it, drawn as it was at each frame's time."""
+
+from collections.abc import Callable, Iterable, Iterator
+from itertools import repeat
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from mjspace.rendering import overlay
+from mjspace.contract import Array
+from mjspace.log.flown_scenario import scenario_of
+from mjspace.scenario.landing import Engine
+from mjspace.log.reader import Log
+from mjspace.rendering.offscreen import Canvas
+from mjspace.vehicle.vehicle import from_bytes
+from mjspace.rendering.scene import Stage
+from mjspace.rendering.video import Frame, Video
+
+
+def render(
+    log_path: Path | str,
+    output: Path | str,
+    *,
+    camera: str = "chase",
+    size: tuple[int, int] = (960, 540),
+    rate: float = 25.0,
+    speed: float = 1.0,
+    at: float | None = None,
+    progress: Callable[[float], None] = lambda time: None,
+) -> None:
+    """Draw a log: a video where ``output`` ends in .mp4, a still where it ends in .png.
+
+    A video has ``rate`` frames a second, ``speed`` simulated seconds for each of its own, and both
+    the log's first instant and (to within a frame) its last. A still is of ``at`` [s], the end when
+    left out. ``size`` is (width, height) in pixels; ``progress`` is told the time drawn [s].
+
+    Raises:
+        ValueError: another ending, no such camera, an odd size of a video, a rate or speed that is
+            not positive, a time that was not logged, or no log of mjspace.
+        NoRendererError: this machine cannot draw, with what to install.
+        OSError: a file cannot be read or written.
+    """
+    log, output = Log(log_path), Path(output)
+    if output.suffix not in (".mp4", ".png"):
+        raise ValueError(f"output {str(output)!r}: end it in .mp4 for a video, .png for a still")
+    if min(size) < 16 or min(rate, speed) <= 0.0:
+        raise ValueError(
+            f"size {size[0]}x{size[1]}, rate {rate:g}, speed {speed:g}: "
+            "a size is at least 16x16, a rate and a speed are positive"
+        )
+    if output.suffix == ".png":
+        times: Array = np.array([_still_time(log, at)])
+        for frame in _frames(log, times, camera, size):
+            Image.fromarray(frame).save(output)
+        return
+    period = speed / rate
+    count = int((log.end - log.start) / period + 1e-9) + 1
+    times = np.linspace(log.start, log.start + period * (count - 1), count)
+    with Video(output, size, rate) as video:
+        for time, frame in zip(times, _frames(log, times, camera, size), strict=True):
+            video.write(frame)
+            progress(float(time))
+
+
+def nearest_rows(log: Log, topic: str, field: str, times: Array) -> Iterator[Array]:
+    """Yield the field's value logged nearest to each of the ascending ``times`` [s], shape (n,).
+
+    The log is read once, with one chunk of it in memory.
+
+    Raises:
+        ValueError: the log has no such topic or field, or nothing near the times.
+    """
+    margin = float(log.metadata["control_period"])
+    stamps, rows, done = np.empty(0), np.empty((0, *log.topics[topic][field])), 0
+    start, end = max(times[0] - margin, 0.0), times[-1] + margin
+    for block in log.blocks(topic, [field], start=start, end=end):
+        # The last row so far may be nearer to a time than the first one of this block.
+        stamps = np.concatenate([stamps[-1:], block["time"]])
+        rows = np.concatenate([rows[-1:], block[field]])
+        due = int(np.searchsorted(times, stamps[-1], side="right"))
+        for time in times[done:due]:
+            yield rows[np.abs(stamps - time).argmin()]
+        done = due
+    if not len(stamps):
+        raise ValueError(f"{log.path} holds nothing on {topic} near {times[0]:g} s")
+    for _ in times[done:]:
+        yield rows[-1]
+
+
+def _still_time(log: Log, at: float | None) -> float:
+    if at is None:
+        return log.end
+    if not log.start <= at <= log.end:
+        raise ValueError(f"at {at:g} s: the log has {log.start:g} s to {log.end:g} s")
+    return at
+
+
+def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Iterator[Frame]:
+    scenario = scenario_of(log)
+    stage = Stage(from_bytes(log.attachment("model.mjb.gz")), camera, scenario.environment.orbit)
+    left = scenario.name, scenario.law.kind
+    pulses: Iterable[Array | None] = repeat(None, len(times))
+    if "on_time" in log.topics.get("/command", {}):
+        pulses = nearest_rows(log, "/command", "on_time", times)
+    with Canvas(stage.model, size) as canvas:
+        for time, physics, wanted, on_time, burning, how_well in zip(
+            times,
+            nearest_rows(log, "/state", "physics", times),
+            nearest_rows(log, "/reference", "attitude", times),
+            pulses,
+            shares_of_thrust(log, scenario.plant.engine, times),
+            captions(log, times),
+            strict=True,
+        ):
+            stage.set(float(time), physics, wanted, on_time, burning)
+            yield overlay.write(canvas.draw(stage.scene), left, (f"{time:.2f} s", how_well))
+
+
+def shares_of_thrust(log: Log, engine: Engine | None, times: Array) -> Iterator[float]:
+    """Yield the engine's share of its largest thrust: 0 where there is none."""
+    if engine is None:
+        yield from repeat(0.0, len(times))
+    else:
+        for thrust in nearest_rows(log, "/truth", "thrust", times):
+            yield float(thrust[0]) / engine.thrust_max
+
+
+def captions(log: Log, times: Array) -> Iterator[str]:
+    """Yield what the caption says of the flight: its path where it has one, else its attitude."""
+
+    def truth(field: str) -> Iterator[Array]:
+        return nearest_rows(log, "/truth", field, times)
+
+    if "position_error" in log.topics["/truth"]:
+        for row in zip(truth("position"), truth("velocity"), truth("position_error"), strict=True):
+            yield overlay.path_text(*row)
+    else:
+        for error in truth("attitude_error"):
+            yield f"attitude error {overlay.angle_text(float(error[0]))}"

@@ -1,0 +1,119 @@
+"""The scene of one logged instant: the model's bodies, the planet, the axes and the wanted ones."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjspace import attitude
+from mjspace.contract import Array
+from mjspace.environment.install import orbit_position
+from mjspace.scenario.environment import Orbit
+from mjspace.rendering.plume import Plume
+
+_GEOM = mujoco.mjtObj.mjOBJ_GEOM
+AXES = 3
+"""The geom group of a model's body axes: not part of the vehicle, shown in pictures."""
+_HALO, _TRANSLUCENT = 2.2, 0.4  # the wanted axes' thickness, and their opacity
+_FASTEST = np.radians(30.0)  # a frame; a rotor of four spokes seems to reverse beyond 45 degrees
+_PLUME = 0.45  # the opacity of a thruster's plume
+_SPARE_GEOMS = 64  # beside the model's own: the wanted axes, and room
+
+
+class Stage:
+    """A model's drawable scene, set to one instant after another.
+
+    The planet is turned with the orbit, so that it stays below. A rotor that turns too far between
+    two frames for the eye is drawn at 30 degrees a frame in its own sense.
+    """
+
+    def __init__(self, model: Any, camera: str, orbit: Orbit | None) -> None:
+        """Prepare to look at ``model`` through its camera of that name.
+
+        Raises:
+            ValueError: there is no such camera, with those that there are.
+        """
+        names = [model.camera(index).name for index in range(model.ncam)]
+        if camera not in names:
+            raise ValueError(f"no camera {camera!r}: have {', '.join(names)}")
+        self.model = model
+        self.scene = mujoco.MjvScene(model, model.ngeom + _SPARE_GEOMS)
+        self._data = mujoco.MjData(model)
+        self._perturb, self._option = mujoco.MjvPerturb(), mujoco.MjvOption()
+        self._option.geomgroup[AXES] = 1
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._camera.fixedcamid = names.index(camera)
+        self._axes = np.flatnonzero(model.geom_group == AXES).tolist()
+        self._rotors = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]
+        plumes = [mujoco.mj_name2id(model, _GEOM, f"thruster_{i}_plume") for i in range(model.nu)]
+        self._plumes = [geom for geom in plumes if geom >= 0]
+        self._angle: Array | None = None
+        self._orbit = orbit
+        self._planet = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "planet")
+        self._below = model.geom_pos[self._planet].copy(), model.geom_quat[self._planet].copy()
+        self._plume = Plume(model)
+
+    def set(
+        self,
+        time: float,
+        physics: Array,
+        wanted: Array,
+        on_time: Array | None = None,
+        burning: float = 0.0,
+    ) -> Array:
+        """Show ``time`` [s]: a row of MuJoCo's integration state, and the wanted attitude (4,).
+
+        Thrusters whose ``on_time`` (n,) is more than zero have a plume; that of an engine is as
+        long as ``burning``, its share of full thrust, says.
+
+        Returns the attitude (4,) of the bus.
+        """
+        model, data = self.model, self._data
+        mujoco.mj_setState(model, data, physics, mujoco.mjtState.mjSTATE_INTEGRATION)
+        self._turn_rotors()
+        if self._orbit is not None and self._planet >= 0:
+            self._turn_planet(orbit_position(self._orbit, time))
+        if on_time is not None:
+            model.geom_rgba[self._plumes, 3] = _PLUME * (on_time > 0.0)
+        self._plume.burn(burning, self._option)
+        mujoco.mj_fwdPosition(model, data)
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(
+            model, data, self._option, self._perturb, self._camera, everything, self.scene
+        )
+        self._plume.lift_shadow(self.scene)
+        for geom in self._axes:
+            self._add_wanted(geom, wanted)
+        bus: Array = data.body("bus").xquat.copy()
+        return bus
+
+    def _turn_rotors(self) -> None:
+        angle = self._data.qpos[self._rotors]
+        if self._angle is None:
+            self._angle = self._drawn = angle
+        self._drawn = self._drawn + np.clip(angle - self._angle, -_FASTEST, _FASTEST)
+        self._angle = angle
+        self._data.qpos[self._rotors] = self._drawn
+
+    def _turn_planet(self, up: Array) -> None:
+        """Move the planet from below, along -z, where the model has it, to opposite ``up``."""
+        turn = np.empty(4)
+        mujoco.mju_quatZ2Vec(turn, up)
+        place, orientation = self._below
+        self.model.geom_pos[self._planet] = attitude.rotate(turn, place)
+        self.model.geom_quat[self._planet] = attitude.multiply(turn, orientation)
+
+    def _add_wanted(self, axis: int, wanted: Array) -> None:
+        """Add a body axis as a halo where it ought to be."""
+        model, scene = self.model, self.scene
+        origin = self._data.xpos[model.geom_bodyid[axis]]
+        mujoco.mjv_initGeom(
+            scene.geoms[scene.ngeom],
+            model.geom_type[axis],
+            model.geom_size[axis] * [_HALO, 1.0, 1.0],
+            origin + attitude.rotate(wanted, model.geom_pos[axis]),
+            attitude.to_matrix(attitude.multiply(wanted, model.geom_quat[axis])).ravel(),
+            model.geom_rgba[axis] * [1.0, 1.0, 1.0, _TRANSLUCENT],
+        )
+        scene.ngeom += 1

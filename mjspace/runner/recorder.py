@@ -1,0 +1,166 @@
+"""A flight's log: what is attached, which units, and blocks of periods as they come."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import mujoco
+import numpy as np
+
+from mjspace.log import foxglove_layout, provenance
+from mjspace.vehicle import vehicle
+from mjspace.simulation.assembly import Assembly
+from mjspace.log.scene import scene
+from mjspace.scenario.loading import to_toml
+from mjspace.log.writer import LogWriter
+from mjspace.simulation.recording import Block, one_vehicle, shapes
+
+FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
+
+UNITS = {
+    "/truth": {
+        "rate": "rad/s",
+        "wheel_speed": "rad/s",
+        "gimbal_angle": "rad",
+        "gimbal_rate": "rad/s",
+        "wheel_angle": "rad",
+        "current": "A",
+        "position": "m",
+        "velocity": "m/s",
+        "position_error": "m",
+        "tilt": "rad",
+        "altitude": "m",
+        "ground_velocity": "m/s",
+        "magnetic_field": "T",
+        "thrust": "N",
+        "propellant": "kg",
+        "momentum": "N m s",
+        "energy": "J",
+        "attitude_error": "rad",
+        "foot_force": "N",
+        "hull_force": "N",
+        "touchdown_velocity": "m/s",
+        "crash_velocity": "m/s",
+    },
+    "/measurement": {
+        "rate": "rad/s",
+        "wheel_speed": "rad/s",
+        "gimbal_angle": "rad",
+        "gimbal_rate": "rad/s",
+        "wheel_angle": "rad",
+        "current": "A",
+        "position": "m",
+        "velocity": "m/s",
+        "specific_force": "m/s^2",
+        "altitude": "m",
+        "ground_velocity": "m/s",
+        "magnetic_field": "T",
+        "thrust": "N",
+        "propellant": "kg",
+    },
+    "/reference": {
+        "rate": "rad/s",
+        "acceleration": "rad/s^2",
+        "position": "m",
+        "velocity": "m/s",
+        "linear_acceleration": "m/s^2",
+    },
+    "/command": {
+        "torque": "N m",
+        "wheel_torque": "N m",
+        "motor_torque": "N m",
+        "gimbal_rate": "rad/s",
+        "thruster_torque": "N m",
+        "dipole": "A m^2",
+        "magnetic_moment": "A m^2",
+        "thrust": "N",
+        "gimbal": "rad",
+        "on_time": "s",
+        "thruster_thrust": "N",
+        "acceleration": "rad/s^2",
+        "load": "N m",
+        "voltage": "V",
+        "engine": "N m, N m, N",
+    },
+    "/law": {"angle": "rad", "angle_rate": "rad/s"},
+    "/disturbance": {"force": "N", "torque": "N m"},
+}
+
+
+class Recorder:
+    """The open log of one vehicle's flight; a context manager."""
+
+    def __init__(self, assembly: Assembly, path: Path, member: int, first: Block) -> None:
+        """Create the log at ``path``; ``first`` is the flight's first block, for its shapes.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        model = assembly.vehicle.model
+        compiled = vehicle.to_bytes(model)
+        attachments = {
+            "model.mjb.gz": ("application/gzip", compiled),
+            "scenario.toml": ("application/toml", to_toml(assembly.scenario).encode()),
+            "foxglove_layout.json": ("application/json", foxglove_layout.layout()),
+        }
+        for name, content in assembly.sources.items():
+            is_code = name.endswith(".py")
+            media_type = "text/x-python" if is_code else "application/octet-stream"
+            attachments[name] = (media_type, content)
+        self._log = LogWriter(
+            path,
+            shapes(first),
+            provenance.metadata(assembly.scenario, compiled, member),
+            attachments,
+            scene(model),
+            UNITS,
+        )
+        self._model, self._data = model, mujoco.MjData(model)
+        self._stride = max(1, round(FRAME_PERIOD / assembly.scenario.rates.control))
+        self.time: float
+        """Of the last period written [s]."""
+
+    def write(self, block: Block) -> None:
+        """Log a block of a flight of one vehicle.
+
+        Raises:
+            OSError: the log cannot be written any more.
+        """
+        rows = one_vehicle(block)
+        # What goes into a chunk beside the periods must be handed over before them.
+        self._write_frames(block, rows["/state"]["physics"])
+        for time, _, level, text in block.events:
+            self._log.event(time, level, text)
+        self._log.write(block.time, rows)
+        self.time = float(block.time[-1])
+
+    def event(self, level: str, text: str) -> None:
+        """Log ``text`` at the flight's present time; ``level`` is INFO, WARNING or ERROR."""
+        self._log.event(self.time, level, text)
+
+    def flush(self) -> None:
+        """Wait until everything given so far can be read from the file."""
+        self._log.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._log.__exit__(kind, error, trace)
+
+    def _write_frames(self, block: Block, physics: np.ndarray) -> None:
+        due = np.flatnonzero((block.period + np.arange(len(block.time))) % self._stride == 0)
+        positions = np.empty((len(due), self._model.nbody - 1, 3))
+        quaternions = np.empty((len(due), self._model.nbody - 1, 4))
+        for i, k in enumerate(due):
+            mujoco.mj_setState(
+                self._model, self._data, physics[k], mujoco.mjtState.mjSTATE_INTEGRATION
+            )
+            mujoco.mj_kinematics(self._model, self._data)
+            positions[i], quaternions[i] = self._data.xpos[1:], self._data.xquat[1:]
+        self._log.write_transforms(block.time[due], positions, quaternions)

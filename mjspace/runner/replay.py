@@ -1,0 +1,245 @@
+"""Flying again from a log alone: to prove it bit for bit, or to see what another law would do."""
+
+import dataclasses
+import math
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from mjspace.vehicle import vehicle
+from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.contract import Measurement
+from mjspace.errors import InputError, blamed_on
+from mjspace.runner.run import Progress, Result, fly_to_log
+from mjspace.log.flown_scenario import scenario_of
+from mjspace.log.reader import Log
+from mjspace.scenario.scenario import Component, Scenario
+from mjspace.simulation.loop import fly
+from mjspace.simulation.initial_state import Start
+from mjspace.simulation.recording import Block, Rows, one_vehicle, shapes
+from mjspace.simulation.user_code import reference_at
+
+SOURCES = ("law", "reference", "disturbance")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where a repeated flight first differs from its log."""
+
+    time: float
+    topic: str
+    field: str
+    index: int
+    logged: float
+    flown: float
+
+    def __str__(self) -> str:
+        """Return it as one line."""
+        return (
+            f"{self.topic}.{self.field}[{self.index}] differs first at t = {self.time:.6g} s: "
+            f"logged {self.logged!r}, flown {self.flown!r}"
+        )
+
+
+def replay(
+    log_path: str | Path,
+    out: str | Path,
+    *,
+    start: float = 0.0,
+    law: Component | None = None,
+    folder: Path = Path(),
+    progress: Progress = lambda time: None,
+) -> Result:
+    """Fly a log again from time ``start`` [s] into a new log, ``flight.mcap`` in ``out``.
+
+    Under another ``law``, whose files are looked up from ``folder``, its state begins at ``start``,
+    and the checks and events of the logged law's signals are left out.
+
+    Raises:
+        InputError: no such log, time or law.
+        OSError: the new log cannot be written.
+    """
+    with blamed_on("log"):
+        log = Log(log_path)
+    path = Path(out) / "flight.mcap"
+    if path.exists() and path.samefile(log_path):
+        raise InputError(f"--out {out}: holds the very log that is to be flown again")
+    with assembly_of(log, law, folder) as assembly:
+        begin = start_of(log, assembly, start, fresh_law=law is not None)
+        member = int(log.metadata["member"])
+        return fly_to_log(assembly, path, member=member, start=begin, progress=progress)
+
+
+def verify(
+    log_path: str | Path, *, start: float = 0.0, progress: Progress = lambda time: None
+) -> Difference | None:
+    """Fly a log again from ``start`` [s]; return where it first differs, None if nowhere.
+
+    Every field of every topic is compared bit for bit, those of ``/state`` first.
+
+    Raises:
+        InputError: no such log or time, or rows that the log's own digests do not know.
+        FlightError: the repeated flight cannot go on where the logged one could.
+    """
+    with blamed_on("log"):
+        log = Log(log_path)
+        altered = log.altered()
+    if altered:
+        raise InputError(
+            f"log: {', '.join(altered)} changed since the flight, by the log's digests"
+        )
+    with assembly_of(log) as assembly:
+        begin = start_of(log, assembly, start)
+        for block in fly(assembly, begin, [int(log.metadata["member"])]):
+            flown = one_vehicle(block)
+            _check_topics(log, block)
+            logged = {
+                topic: log.read(topic, start=block.time[0], end=block.time[-1]) for topic in flown
+            }
+            found = first_difference(logged, flown)
+            if found is not None:
+                return found
+            progress(float(block.time[-1]))
+            if len(logged["/state"]["time"]) < len(block.time):
+                break  # the log ends here: its flight was interrupted
+    return None
+
+
+@contextmanager
+def assembly_of(
+    log: Log, law: Component | None = None, folder: Path = Path()
+) -> Iterator[Assembly]:
+    """Give what flew in ``log``, or the same under another ``law``.
+
+    The scenario, the compiled model and the files of one's own all come from the log.
+
+    Raises:
+        InputError: the log lacks one of them, the law cannot be built, or another version packed
+            the environment into the state differently.
+    """
+    with blamed_on("log"):
+        scenario = scenario_of(log)
+    if law is not None:
+        scenario = _without_signals_of_the_law(scenario).model_copy(update={"law": law})
+    with tempfile.TemporaryDirectory() as own:
+        _unpack(log, Path(own))
+        assembly = assemble(scenario, Path(own), law_folder=None if law is None else folder)
+        model = vehicle.from_bytes(log.attachment("model.mjb.gz"))
+        here = assembly.vehicle.model
+        if (model.nq, model.nv, model.nuserdata) != (here.nq, here.nv, here.nuserdata):
+            raise InputError(
+                "log: another version of mjspace laid its state out differently: fly it again with "
+                f"version {log.metadata.get('mjspace', 'that flew it')} and the revision "
+                f"{log.metadata.get('git') or 'that it names'}"
+            )
+        yield dataclasses.replace(assembly, vehicle=vehicle.on_model(assembly.vehicle, model))
+
+
+def _unpack(log: Log, own: Path) -> None:
+    """Write the files of one's own that the log holds, ``law.py`` or ``law/helpers.py``."""
+    for name in log.attachments:
+        if name.partition("/")[0].removesuffix(".py") not in SOURCES:
+            continue
+        file = own / name
+        if not file.resolve().is_relative_to(own.resolve()):
+            raise InputError(f"log: the attachment {name!r} leads out of its folder")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(log.attachment(name))
+
+
+def _without_signals_of_the_law(scenario: Scenario) -> Scenario:
+    """Return the scenario without what looks at the law's signals, which another need not have."""
+
+    def is_free(*signals: str) -> bool:
+        return not any(signal.startswith("law.") for signal in signals)
+
+    events = [event for event in scenario.events if is_free(event.signal, *event.shows)]
+    told = {None, *(event.name for event in events)}
+    checks = [c for c in scenario.checks if is_free(c.signal) and {c.since, c.until} <= told]
+    return scenario.model_copy(update={"events": events, "checks": checks})
+
+
+def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = False) -> Start:
+    """Return the logged period nearest ``time`` [s] as a start; ``fresh_law`` resets the law there.
+
+    Raises:
+        InputError: the log does not hold that time, or not this law's state.
+    """
+    period = assembly.scenario.rates.control
+    number = round(time / period)
+    near = (number - 0.5) * period, (number + 0.5) * period
+    row = log.read("/state", None, *near)
+    if len(row["time"]) != 1:
+        raise InputError(f"t = {time:g} s is not in the log: it has {log.start:g} to {log.end:g} s")
+    state = {name: values for name, values in row.items() if name != "time"}
+    sensors, actuators = (
+        {name.removeprefix(kind): v for name, v in state.items() if name.startswith(kind)}
+        for kind in ("sensor_", "actuator_")
+    )
+    law_state: Any = None
+    if not fresh_law:
+        seen = log.read("/measurement", None, *near)
+        wanted = reference_at(assembly.reference, np.array([number * period]))
+        template = assembly.law.reset(
+            Measurement(**{n: seen.get(n, np.empty((1, 0))) for n in Measurement._fields}),
+            type(wanted)(*(values[0] for values in wanted)),
+        )
+        names = getattr(template, "_fields", ())
+        missing = [name for name in names if f"law_{name}" not in state]
+        if missing:
+            raise InputError(f"the log has no state {missing[0]!r} for this law: another flew")
+        law_state = type(template)(*(state[f"law_{name}"] for name in names)) if names else ()
+    return Start(number, state["physics"], sensors, law_state, actuators)
+
+
+def _check_topics(log: Log, block: Block) -> None:
+    """Refuse a log whose topics are not those of the flight again, as of another version."""
+    flown = shapes(block)
+    for topic in flown | log.topics:
+        if flown.get(topic) != log.topics.get(topic):
+            raise InputError(
+                f"log: {topic} holds {log.topics.get(topic)}, flown again {flown.get(topic)}: "
+                "another version of mjspace wrote it"
+            )
+
+
+def first_difference(logged: Rows, flown: Rows) -> Difference | None:
+    """Return where ``flown`` first differs from ``logged``, which has ``time`` in each topic.
+
+    ``logged`` may end earlier. Of one instant the first topic and field count, in the flown order.
+    """
+    found: Difference | None = None
+    for topic, fields in flown.items():
+        time = logged[topic]["time"]
+        n = len(time)
+        for name, rows in fields.items():
+            width = math.prod(rows.shape[1:])
+            a, b = (
+                np.ascontiguousarray(both[:n]).reshape(n, width)
+                for both in (logged[topic][name], rows)
+            )
+            places = np.argwhere(a.view(np.uint64) != b.view(np.uint64))
+            if len(places) and (found is None or time[places[0][0]] < found.time):
+                k, i = map(int, places[0])
+                found = Difference(float(time[k]), topic, name, i, float(a[k, i]), float(b[k, i]))
+    return found
+
+
+class _Callable(ModuleType):
+    """This module, once imported, is what ``mjspace.replay`` names: it flies as the function does.
+
+    A package's attribute is the submodule of that name, whatever the package defines itself.
+    """
+
+    def __call__(self, *arguments: Any, **options: Any) -> Result:
+        return replay(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _Callable

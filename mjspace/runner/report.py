@@ -1,0 +1,115 @@
+"""Verdicts and facts as tables for a person, or as plain data for another program."""
+
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from mjspace.runner.checks import Verdict
+from mjspace.runner.run import Result
+from mjspace.log.reader import Log
+
+
+def print_result(result: Result) -> None:
+    """Print the table of checks, what went wrong if anything did, and where the log is."""
+    console = Console()
+    if result.verdicts:
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        table.add_column("check")
+        table.add_column("measured", justify="right")
+        table.add_column("required")
+        table.add_column("verdict")
+        for verdict in result.verdicts:
+            table.add_row(
+                escape(verdict.check.name),
+                "-" if verdict.missing else f"{verdict.measured:.4g}",
+                verdict.bound,
+                _word(verdict),
+            )
+        console.print(table)
+        for verdict in result.verdicts:
+            if verdict.missing or verdict.check.because:
+                console.print(verdict.line, style=_style(verdict), markup=False, highlight=False)
+    if result.trouble:
+        console.print(f"[bold red]ended early:[/] {escape(result.trouble)}", highlight=False)
+
+
+def _word(verdict: Verdict) -> str:
+    expected = verdict.check.expected
+    note = ""
+    if expected == "FAIL":
+        note = " as expected" if verdict.as_expected else f", expected {expected}"
+    return f"[{_style(verdict)}]{verdict.outcome}{note}[/]"
+
+
+def _style(verdict: Verdict) -> str:
+    return "green" if verdict.as_expected else "bold red"
+
+
+def result_data(result: Result) -> dict[str, Any]:
+    """Return the result as ``--json`` prints it."""
+    return {
+        "passed": result.passed,
+        "trouble": result.trouble,
+        "log": str(result.path),
+        "checks": [
+            {
+                "name": verdict.check.name,
+                "signal": verdict.check.signal,
+                "statistic": verdict.check.statistic,
+                "measured": None if verdict.missing else verdict.measured,
+                "below": verdict.check.below,
+                "above": verdict.check.above,
+                "verdict": verdict.outcome,
+                "expected": verdict.check.expected,
+                "as_expected": verdict.as_expected,
+                "because": verdict.check.because,
+                "missing": verdict.missing,
+            }
+            for verdict in result.verdicts
+        ],
+    }
+
+
+def log_data(log: Log) -> dict[str, Any]:
+    """Return what a log holds."""
+    return {
+        "metadata": dict(log.metadata),
+        "complete": log.complete,
+        "altered": log.altered(),
+        "start": log.start,
+        "end": log.end,
+        "topics": {
+            topic: {field: list(shape) for field, shape in fields.items()}
+            for topic, fields in log.topics.items()
+        },
+        "attachments": sorted(log.attachments),
+        "events": [
+            {"time": time, "level": level, "message": message}
+            for time, level, message in log.events()
+        ],
+    }
+
+
+def print_log(log: Log) -> None:
+    """Print what a log holds."""
+    console = Console()
+    whole = "complete" if log.complete else "[bold red]incomplete: the flight was cut off[/]"
+    console.print(f"{log.start:g} to {log.end:g} s, {whole}", highlight=False)
+    table = Table(box=None, pad_edge=False, show_header=False)
+    for key, value in log.metadata.items():
+        table.add_row(key, escape(value))
+    for topic, fields in log.topics.items():
+        listed = (f"{name} {'x'.join(map(str, shape)) or 1}" for name, shape in fields.items())
+        table.add_row(topic, ", ".join(listed))
+    table.add_row("attachments", ", ".join(sorted(log.attachments)))
+    altered = log.altered()
+    if altered is not None:
+        changed = f"[bold red]{', '.join(altered)} changed since the flight[/]"
+        table.add_row("digests", changed if altered else "every topic as it was written")
+    console.print(table)
+    for time, level, message in log.events():
+        console.print(
+            f"{time:12.6f} s  {level:7}  {message}", highlight=False, markup=False, soft_wrap=True
+        )

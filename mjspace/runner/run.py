@@ -1,0 +1,115 @@
+"""A flight from scenario to verdict: fly it, log it as it flies, judge the log."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import chain
+from pathlib import Path
+
+from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.runner.checks import Verdict, judge, refuse_unknown
+from mjspace.errors import FlightError
+from mjspace.scenario.loading import load
+from mjspace.log.reader import Log
+from mjspace.runner.recorder import Recorder
+from mjspace.simulation.loop import fly
+from mjspace.simulation.initial_state import Start, first_start
+from mjspace.runner.interrupts import on_signals
+from mjspace.simulation.recording import shapes
+
+Progress = Callable[[float], None]
+"""Told the simulated time reached [s]."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a flight left behind."""
+
+    path: Path
+    """The log."""
+    verdicts: list[Verdict]
+    trouble: str
+    """Why it ended early; empty for a flight that reached its end."""
+    signal: int
+    """The signal that ended it, 0 for none."""
+    error: FlightError | None = None
+    """The error that ended it; its ``__cause__`` is what the user's own code raised."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it reached its end and every check came out as expected."""
+        return not self.trouble and all(verdict.as_expected for verdict in self.verdicts)
+
+    @property
+    def log(self) -> Log:
+        """The log, to read."""
+        return Log(self.path)
+
+
+def run(
+    scenario: str | Path,
+    *,
+    overrides: Iterable[str] = (),
+    out: str | Path | None = None,
+    progress: Progress = lambda time: None,
+) -> Result:
+    """Fly a scenario, by name or path, and judge it; the log is ``flight.mcap`` in ``out``.
+
+    ``overrides`` are ``"key=value"``, as ``--set`` takes them; ``out`` is
+    runs/<scenario>/<UTC stamp> when left out.
+
+    Raises:
+        InputError: bad input, in one line; nothing has been written.
+        FlightError: it could not even begin.
+        OSError: the log cannot be written (any more); it keeps what it has.
+    """
+    loaded, folder = load(scenario, overrides)
+    assembly = assemble(loaded, folder)
+    return fly_to_log(assembly, output_folder(out, loaded.name) / "flight.mcap", progress=progress)
+
+
+def output_folder(out: str | Path | None, name: str) -> Path:
+    """Return where a run called ``name`` writes."""
+    if out is not None:
+        return Path(out)
+    return Path("runs") / name / datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+
+
+def fly_to_log(
+    assembly: Assembly,
+    path: Path,
+    *,
+    member: int = 0,
+    start: Start | None = None,
+    progress: Progress = lambda time: None,
+) -> Result:
+    """Fly one member of the scenario, from ``start`` or time zero, into a new log, and judge it.
+
+    Raises:
+        InputError: a check of the scenario names no signal of this flight; nothing is written.
+        FlightError: it could not even begin.
+        OSError: the log cannot be written (any more); it keeps what it has.
+    """
+    start = start or first_start(assembly, [member])
+    trouble, ended_by = "", None
+    with on_signals() as stop:
+        blocks = fly(assembly, start, [member], stop=stop)
+        first = next(blocks)
+        refuse_unknown(assembly.scenario.checks, shapes(first))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with Recorder(assembly, path, member, first) as recorder:
+            try:
+                for block in chain([first], blocks):
+                    recorder.write(block)
+                    progress(float(block.time[-1]))
+            except FlightError as error:
+                trouble, ended_by = str(error), error
+            if stop():
+                trouble = f"interrupted by signal {stop.signal} at t = {recorder.time:.6g} s"
+            if trouble:
+                recorder.event("ERROR", trouble)
+            recorder.flush()
+            verdicts = judge(Log(path), assembly.scenario.checks, assembly.scenario.events)
+            for verdict in verdicts:
+                recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
+    return Result(path, verdicts, trouble, stop.signal, ended_by)

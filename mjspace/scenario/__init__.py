@@ -1,0 +1,1 @@
+"""A scenario, typed: its tables, how it is loaded and overridden, and what it names constructed."""

@@ -1,0 +1,192 @@
+"""From a name and a table of gains to a law or a reference: find the class, check, construct."""
+
+import dataclasses
+import difflib
+import importlib
+import inspect
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal, get_args, get_origin
+
+import numpy as np
+
+from mjspace.scenario.gain_tables import columns
+from mjspace.units import quantity_in, to_si
+from mjspace.ranges import numbers, refuse_unfit
+from mjspace.scenario.scenario import Component
+from mjspace.scenario.user_files import load_file
+
+
+def load_object(kind: str, folder: Path) -> Any:
+    """Return what ``"module:Name"`` or ``"file.py:Name"`` names.
+
+    A file is looked up from ``folder``; a module in mjspace.controllers first, then anywhere.
+
+    Raises:
+        ValueError: no such module, file or name, with the near ones.
+    """
+    place, _, name = kind.partition(":")
+    if not place or not name:
+        raise ValueError(f"{kind!r}: write 'module:Class' or 'file.py:Class'")
+    module = load_file(folder / place) if place.endswith(".py") else _import(place)
+    if not hasattr(module, name):
+        have = [key for key, value in vars(module).items() if inspect.isclass(value)]
+        raise ValueError(f"{place!r} has no {name!r}{nearest(name, have)}")
+    return getattr(module, name)
+
+
+def construct(
+    component: Component, kind: type, facts: Mapping[str, Any], folder: Path
+) -> tuple[Any, Component]:
+    """Return the object of class ``kind`` with the component's gains, and the component as flown.
+
+    A parameter that the table leaves out is taken from ``facts`` where they hold its name (the
+    vehicle's properties), else from its default; the component as flown has all written out.
+    ``file`` gives the rows of a table read from a CSV file with a header of parameter names. A
+    table in a gain that has a ``kind`` is constructed in the same way.
+
+    Raises:
+        ValueError: an unknown, missing or unfit gain, with its name and what would be right.
+    """
+    gains = component.gains
+    if "file" in gains:
+        read = columns(folder / str(gains.pop("file")))
+        if both := sorted(read.keys() & gains.keys()):
+            raise ValueError(f"{both[0]}: given both here and in the file: give it once")
+        gains |= read
+    parameters = _parameters(kind)
+    for name in gains:
+        if name not in parameters:
+            raise ValueError(f"{name}: {component.kind} has no such key{nearest(name, parameters)}")
+    inside = {name: gain for name, gain in gains.items() if _has_kind(gain)}
+    written = {}
+    for name, gain in inside.items():
+        gains[name], written[name] = _within(name, gain, facts, folder)
+    values = {name: facts[name] for name in parameters if name in facts} | gains
+    missing = [
+        name
+        for name, parameter in parameters.items()
+        if parameter.default is parameter.empty and name not in values
+    ]
+    if missing:
+        raise ValueError(f"{missing[0]}: missing, and {component.kind} has no default for it")
+    declared = {f.name: f.metadata for f in dataclasses.fields(kind)} if _is_data(kind) else {}
+    for name, value in values.items():
+        if "unit" in declared.get(name, {}):
+            values[name] = _in_si(name, value, declared[name])
+        elif name not in inside:
+            _refuse_unlike(name, value, parameters[name].annotation, component.kind)
+    refuse_unfit(values, declared)
+    built = kind(**values)
+    flown = {name: getattr(built, name, values.get(name)) for name in parameters} | written
+    return built, Component(kind=component.kind, **{k: plain(v) for k, v in flown.items()})
+
+
+def _has_kind(value: Any) -> bool:
+    """Return whether the gain is, or holds, a table with a ``kind``."""
+    if isinstance(value, Mapping):
+        return "kind" in value or any(map(_has_kind, value.values()))
+    return isinstance(value, list) and any(map(_has_kind, value))
+
+
+def _within(key: str, value: Any, facts: Mapping[str, Any], folder: Path) -> tuple[Any, Any]:
+    """Return the gain with every table that has a ``kind`` constructed, and as flown."""
+    if isinstance(value, list):
+        pairs = [_within(f"{key}.{n}", item, facts, folder) for n, item in enumerate(value)]
+        return [built for built, _ in pairs], [flown for _, flown in pairs]
+    if not isinstance(value, Mapping):
+        return value, value
+    if "kind" not in value:
+        items = {name: _within(f"{key}.{name}", v, facts, folder) for name, v in value.items()}
+        return {n: built for n, (built, _) in items.items()}, {
+            n: flown for n, (_, flown) in items.items()
+        }
+    if not isinstance(value["kind"], str):
+        raise ValueError(f"{key}.kind: got {value['kind']!r}, should be text")
+    inner = Component.model_validate(value)
+    try:
+        if inner.kind.partition(":")[0].endswith(".py"):
+            raise ValueError(
+                f"{inner.kind}: a law within another comes from a module, as the log "
+                "keeps the text of one file alone"
+            )
+        built, flown = construct(inner, load_object(inner.kind, folder), facts, folder)
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from error
+    return built, {"kind": flown.kind, **flown.gains}
+
+
+def nearest(name: str, names: Any) -> str:
+    """Return ``": nearest is 'x' (have a, b, x)"`` for an error message."""
+    near = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
+    have = ", ".join(names) or "none"
+    return f": did you mean {near[0]!r}? (have {have})" if near else f": have {have}"
+
+
+def plain(value: Any) -> Any:
+    """Return ``value`` with its arrays as lists, as TOML can hold it."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value
+
+
+def _is_data(kind: type) -> bool:
+    return dataclasses.is_dataclass(kind)
+
+
+def _parameters(kind: type) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters of ``kind``, their annotations as types where those are known."""
+    try:
+        return inspect.signature(kind, eval_str=True).parameters
+    except NameError:
+        return inspect.signature(kind).parameters
+
+
+def _in_si(name: str, value: Any, declared: Mapping[str, Any]) -> Any:
+    """Return a declared gain in SI: an array, or the one number that it should be."""
+    try:
+        array = numbers(to_si(value, declared["unit"]))
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    if array.shape or declared["shape"]:
+        return array
+    number = float(array)
+    return int(number) if declared["range"].whole and number.is_integer() else number
+
+
+def _refuse_unlike(name: str, value: Any, annotation: Any, kind: str) -> None:
+    """Refuse a value that is not of the type that an undeclared gain is annotated with."""
+    written = quantity_in(value)
+    if written is not None and annotation is not str:
+        unit = written.partition(" ")[2]
+        raise ValueError(
+            f"{name}: got {written!r}, but {kind} declares no unit for it: write a number in SI, "
+            f"or declare {name}: float = gain({unit!r}) in the law (mjspace.contract.gain)"
+        )
+    if get_origin(annotation) is Literal:
+        if value not in get_args(annotation):
+            have = ", ".join(map(repr, get_args(annotation)))
+            raise ValueError(f"{name}: got {value!r}, should be one of {have}")
+        return
+    word = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
+    if annotation not in word:
+        return
+    kinds = (int, float) if annotation is float else annotation
+    right = isinstance(value, kinds) and (annotation is bool or not isinstance(value, bool))
+    if not right or value != value:  # nan is no number
+        raise ValueError(f"{name}: got {value!r}, should be {word[annotation]}")
+
+
+def _import(name: str) -> ModuleType:
+    for full in (f"mjspace.controllers.{name}", name):
+        try:
+            return importlib.import_module(full)
+        except ModuleNotFoundError as error:
+            if error.name is None or not full.startswith(error.name):
+                raise ValueError(f"{name!r} cannot be imported: {error}") from error
+    package = importlib.import_module("mjspace.controllers")
+    have = sorted(path.stem for path in Path(package.__path__[0]).glob("[a-z]*.py"))
+    raise ValueError(f"no module {name!r}{nearest(name, have)}")

@@ -1,0 +1,45 @@
+"""Where a signal is wanted, or watched: between bounds."""
+
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import field_validator, model_validator
+
+from mjspace.contract import Array
+from mjspace.scenario.fields import Finite, Table
+from mjspace.units import any_to_si
+
+
+class Region(Table):
+    """Where a signal has to be."""
+
+    signal: str
+    """``topic.field`` or ``topic.field[i]`` of the log: ``truth.attitude_error``; of a vector its
+    norm."""
+    below: Finite | None = None
+    """It must be less; a number in SI or a quantity."""
+    above: Finite | None = None
+    """It must be greater; a number in SI or a quantity."""
+
+    @field_validator("below", "above", mode="before")
+    @classmethod
+    def _quantity(cls, value: Any) -> Any:
+        return any_to_si(value) if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        if self.below is None and self.above is None:
+            raise ValueError("neither below nor above is given: a region must have an outside")
+        if self.below is not None and self.above is not None and self.below <= self.above:
+            raise ValueError(
+                f"below {self.below:g} and above {self.above:g}: nothing is inside, "
+                "below should be the larger"
+            )
+        return self
+
+    def admits(self, value: Array | float) -> NDArray[np.bool_]:
+        """Return whether each value is inside; what is no number never is."""
+        below = True if self.below is None else np.less(value, self.below)
+        above = True if self.above is None else np.greater(value, self.above)
+        return np.logical_and(below, above)

@@ -1,0 +1,241 @@
+"""A scenario, whole: what flies, where, under which law, how long, and what it must show."""
+
+import math
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from mjspace.scenario.environment import Environment
+from mjspace.scenario.faults import Fault
+from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
+from mjspace.units import any_to_si, whole_number
+from mjspace.ranges import numbers
+from mjspace.scenario.region import Region
+from mjspace.scenario.sensors import Sensors
+from mjspace.scenario.plant import Initial, PlantTable, Rates
+
+_TICK = 1e-9
+"""s: what the log's stamps can tell apart."""
+
+
+class Component(BaseModel):
+    """A law or a reference: ``kind`` names a class, every other key is one of its gains."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, use_attribute_docstrings=True)
+
+    kind: str
+    """``"module:Class"`` in controllers/, or ``"path/to/file.py:Class"`` beside the scenario."""
+
+    @property
+    def gains(self) -> dict[str, Any]:
+        """The table without ``kind``."""
+        return dict(self.model_extra or {})
+
+
+class Watched(Region):
+    """Where a logged signal is wanted, or watched."""
+
+    name: str
+    """What it says in the table of checks, or in the log."""
+
+
+class Event(Watched):
+    """What the log is to mention: each time the signal comes into the region, with its value."""
+
+    level: Literal["INFO", "WARNING"] = "INFO"
+    """Of the line on /events."""
+    shows: list[str] = []
+    """Other signals whose values the line gives as well."""
+
+
+class Check(Watched):
+    """One thing that the flight must show, judged from the log alone."""
+
+    statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
+    """Over the window: of the value, or of the norm of a vector; ``peak`` is the largest magnitude,
+    ``drift`` the largest change from the window's first value. It is what has to be in bounds."""
+    start: Time = 0.0
+    """The window's first instant."""
+    end: Time | None = None
+    """The window's last instant; the flight's when left out."""
+    since: str | None = None
+    """Name of an event: the window's instants are counted from when it first happened."""
+    until: str | None = None
+    """Name of an event: the window ends before it first happened."""
+    target: float | list[float] | None = None
+    """Taken from the signal first, so that the statistic is of an error; numbers in SI or
+    quantities."""
+    relative: Switch = False
+    """The error is divided by the norm of ``target``."""
+    expected: Literal["PASS", "FAIL"] = "PASS"
+    """How the check comes out when all is well: FAIL of what the flight shows not to hold. The
+    scenario passes if it reaches its end and every check comes out as expected; a check without a
+    sample in its window comes out neither way."""
+    because: str = ""
+    """Why it fails, in one line: required with ``expected = "FAIL"``."""
+    fails_with: list[str] = []
+    """``"key=value"``, or a list of them that go together, as ``--set`` takes them: a change of the
+    scenario with which the check comes out the other way, because what it claims is gone."""
+
+    @field_validator("fails_with", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return [value] if isinstance(value, str) else value
+
+    @field_validator("fails_with")
+    @classmethod
+    def _of_the_flight(cls, value: list[str]) -> list[str]:
+        for override in value:
+            key, equals, _ = override.partition("=")
+            if not equals or not key.strip():
+                raise ValueError(f"got {override!r}, should be 'key=value'")
+            if key.strip().split(".")[0] == "checks":
+                raise ValueError(f"{override!r} changes a check, should change the flight")
+        return value
+
+    @model_validator(mode="after")
+    def _reason_for_a_failure(self) -> Self:
+        if self.expected == "FAIL" and not self.because.strip():
+            raise ValueError('expected = "FAIL" needs because = "why it fails, in one line"')
+        if self.expected == "PASS" and self.because:
+            raise ValueError('because goes with expected = "FAIL"')
+        return self
+
+    @field_validator("target", mode="before")
+    @classmethod
+    def _numbers(cls, value: Any) -> Any:
+        if value is None:
+            return None
+        items = value if isinstance(value, list | tuple) else [value]
+        found = numbers([any_to_si(item) if isinstance(item, str) else item for item in items])
+        if found.ndim != 1 or not len(found) or not np.isfinite(found).all():
+            raise ValueError(f"got {value!r}, should be a finite number or a list of them")
+        return found.tolist() if isinstance(value, list | tuple) else float(found[0])
+
+    @model_validator(mode="after")
+    def _of_an_error(self) -> Self:
+        if self.relative and self.target is None:
+            raise ValueError("relative: needs a target")
+        if self.relative and not np.any(self.target):
+            raise ValueError("relative: the target is zero, by which no error can be divided")
+        return self
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.end is not None and self.end < self.start:
+            raise ValueError(f"start: {self.start:g} s is after end, {self.end:g} s")
+        return self
+
+    def begins_too_late(self, duration: float) -> bool:
+        """Return whether a flight of ``duration`` [s] ends before the window begins."""
+        return self.start > duration + _TICK
+
+    def is_between_samples(self, period: float) -> bool:
+        """Return whether the window lies between two instants of a log of that ``period`` [s]."""
+        if self.end is None or self.since is not None:
+            return False
+        return math.floor((self.end + _TICK) / period) * period < self.start - _TICK
+
+
+class Scenario(Table):
+    """One flight, whole: what flies, where, under which law, how long, and what it must show."""
+
+    name: str = ""
+    """The file's name when left out."""
+    description: str
+    """One line: what the flight shows."""
+    source: str = ""
+    """Where its numbers come from."""
+    seed: Count = 0
+    """Of every random stream."""
+    duration: Seconds
+    """Simulated time."""
+    rates: Rates = Rates()
+    plant: PlantTable = PlantTable()
+    initial: Initial = Initial()
+    environment: Environment = Environment()
+    sensors: Sensors = Sensors()
+    reference: Component
+    law: Component
+    faults: list[Fault] = []
+    checks: list[Check] = []
+    events: list[Event] = []
+
+    @model_validator(mode="before")
+    @classmethod
+    def _failures_are_named(cls, table: Any) -> Any:
+        if isinstance(table, dict) and "verdict" in table:
+            raise ValueError(
+                "verdict: a scenario names the checks that fail: in each of these [[checks]] write "
+                'expected = "FAIL" and because = "why it fails"'
+            )
+        return table
+
+    @model_validator(mode="after")
+    def _checks_of_events(self) -> "Scenario":
+        names = [event.name for event in self.events]
+        for number, check in enumerate(self.checks):
+            for key in ("since", "until"):
+                name = getattr(check, key)
+                if name is not None and name not in names:
+                    raise ValueError(f"checks.{number}.{key}: no event {name!r} in events: {names}")
+        return self
+
+    @model_validator(mode="after")
+    def _magnets_in_a_field(self) -> "Scenario":
+        magnets = {
+            "plant.magnetorquers": self.plant.magnetorquers,
+            "sensors.magnetic_field": self.sensors.magnetic_field,
+        }
+        for key, table in magnets.items():
+            if table is not None and self.environment.magnetic_field is None:
+                raise ValueError(f"{key}: needs an [environment.magnetic_field]")
+        return self
+
+    @model_validator(mode="after")
+    def _whole_periods(self, info: ValidationInfo) -> "Scenario":
+        step = self.rates.physics
+        spans: dict[str, float | None] = {"rates.control": self.rates.control}
+        for name, sensor in self.sensors:
+            spans[f"sensors.{name}.period"] = None if sensor is None else sensor.period
+        for key, span in spans.items():
+            if span is not None:
+                whole_number(span, step, key, "rates.physics")
+        if not _is_flown(info):
+            whole_number(self.duration, self.rates.control, "duration", "rates.control")
+        return self
+
+    @model_validator(mode="after")
+    def _windows_with_samples(self, info: ValidationInfo) -> "Scenario":
+        if _is_flown(info):
+            return self
+        period = self.rates.control
+        for number, check in enumerate(self.checks):
+            if check.begins_too_late(self.duration) and not _is_cut_short(info):
+                raise ValueError(
+                    f"checks.{number}.start: {check.start:g} s is after the flight's end, duration "
+                    f"{self.duration:g} s"
+                )
+            if check.is_between_samples(period):
+                raise ValueError(
+                    f"checks.{number}: nothing is logged from {check.start:g} to {check.end:g} s, "
+                    f"but every {period:g} s (rates.control)"
+                )
+        return self
+
+
+def _is_flown(info: ValidationInfo) -> bool:
+    """Return whether the scenario is a log's, whose flight is judged again as it was."""
+    return bool((info.context or {}).get("flown"))
+
+
+def _is_cut_short(info: ValidationInfo) -> bool:
+    """Return whether a duration on the command line may leave checks without a window."""
+    return bool((info.context or {}).get("cut_short"))

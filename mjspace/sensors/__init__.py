@@ -1,0 +1,1 @@
+"""The sensors: sampling, delay, noise and bias."""

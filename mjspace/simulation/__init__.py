@@ -1,0 +1,1 @@
+"""The simulation: everything that flies, assembled, and the loop that flies it."""

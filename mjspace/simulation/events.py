@@ -1,0 +1,48 @@
+"""The events that a scenario declares: a logged signal comes into a region."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mjspace.runner.checks import Topics, find_signal, magnitude
+from mjspace.contract import Array
+from mjspace.errors import blamed_on
+from mjspace.scenario.scenario import Event
+from mjspace.simulation.recording import Block, Happening, shapes
+
+
+def with_crossings(block: Block, declared: Sequence[Event], before: Array) -> tuple[Block, Array]:
+    """Return the block with an event for each entry, and who is inside at its end.
+
+    ``before`` and what is returned, (N, events), say of each vehicle whether it is inside; one that
+    begins inside has entered, and a value that is no number never is.
+
+    Raises:
+        InputError: an event is of, or shows, no signal of this flight, with the near names.
+    """
+    happened: list[Happening] = []
+    after = before.copy()
+    topics = shapes(block)
+    for number, event in enumerate(declared):
+        with blamed_on(f"events.{number}.signal"):
+            values = magnitude(_rows(block, topics, event.signal))
+        with blamed_on(f"events.{number}.shows"):
+            shown = {name: _rows(block, topics, name) for name in event.shows}
+        inside = event.admits(values)
+        entered = inside & ~np.concatenate([before[None, :, number], inside[:-1]])
+        after[:, number] = inside[-1]
+        for k, vehicle in np.argwhere(entered):
+            text = f"{event.name}: {event.signal} = {values[k, vehicle]:.6g}"
+            for name, of_name in shown.items():
+                text += f"; {name} = {' '.join(f'{value:.4g}' for value in of_name[k, vehicle])}"
+            happened.append((float(block.time[k]), int(vehicle), event.level, text))
+    in_order = sorted([*block.events, *happened], key=lambda happening: happening[:2])
+    return replace(block, events=in_order), after
+
+
+def _rows(block: Block, topics: Topics, signal: str) -> Array:
+    """Return the signal's numbers, (n, N, k)."""
+    topic, field, part = find_signal(topics, signal)
+    rows = block.rows[topic][field]
+    return rows.reshape(*rows.shape[:2], -1)[..., part]

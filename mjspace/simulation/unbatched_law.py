@@ -1,0 +1,61 @@
+"""Flying a law that knows nothing of batches: one vehicle at a time, stacked again."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mjspace.contract import Law, Measurement, Wanted
+from mjspace.errors import FlightError
+from mjspace.simulation.user_code import check_state, check_step
+
+
+class OneByOne:
+    """A law of arrays without a vehicle axis, flown on arrays with one."""
+
+    def __init__(self, law: Law) -> None:
+        self._law = law
+
+    def reset(self, measurement: Measurement, reference: Wanted) -> Any:
+        """Return the law's state with a vehicle axis."""
+        states = [self._law.reset(one, reference) for one in _vehicles(measurement)]
+        for state in states:
+            check_state(state)
+        return _stack("state", states)
+
+    def step(
+        self, state: Any, time: float, measurement: Measurement, reference: Wanted
+    ) -> tuple[Any, Any, Any]:
+        """Return the law's state, command and signals with a vehicle axis."""
+        states = _vehicles(state) if state else [state] * len(measurement.rate)
+        flown = [
+            self._law.step(s, time, m, reference)
+            for s, m in zip(states, _vehicles(measurement), strict=True)
+        ]
+        for returned in flown:
+            check_step(returned)
+        after, commands, signals = zip(*flown, strict=True)
+        return _stack("state", after), _stack("command", commands), _stack("signals", signals)
+
+
+def _vehicles(arrays: Any) -> list[Any]:
+    return [type(arrays)(*row) for row in zip(*arrays, strict=True)]
+
+
+def _stack(name: str, tuples: Sequence[Any]) -> Any:
+    """Return the named tuples as one, a vehicle axis before each field; None is an empty tuple.
+
+    Raises:
+        FlightError: a field is not numeric, or differs in shape between vehicles.
+    """
+    if not tuples[0]:
+        return ()
+    fields = []
+    for field, column in zip(tuples[0]._fields, zip(*tuples, strict=True), strict=True):
+        try:
+            fields.append(np.array(column, dtype=float))
+        except (TypeError, ValueError) as error:
+            raise FlightError(
+                f"the law's {name}.{field} is not an array of numbers: {error}"
+            ) from error
+    return type(tuples[0])(*fields)

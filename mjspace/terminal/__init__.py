@@ -1,0 +1,1 @@
+"""What the command line shows: options, progress, reports of errors."""

@@ -1,0 +1,1 @@
+"""The vehicle: composition of its MJCF, mass properties, indices into MuJoCo's arrays, checks."""

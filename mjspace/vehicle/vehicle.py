@@ -1,0 +1,234 @@
+"""The vehicle: a scenario's table composed from assets/ into one compiled MuJoCo model.
+
+State rows are MuJoCo's: ``qpos[0:3]`` is the bus's position, ``qpos[3:7]`` its attitude (scalar
+first, body to inertial); ``qvel[0:3]`` is its velocity in INERTIAL axes, ``qvel[3:6]`` its angular
+velocity in BODY axes. The body origin is the vehicle's centre of mass, but for wheel imbalance.
+"""
+
+import gzip
+import warnings
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjspace.vehicle import indices, composition, model_checks, mass_properties
+from mjspace.contract import Array
+from mjspace.scenario.plant import Initial, PlantTable, Rates
+
+
+class UnphysicalInertiaWarning(UserWarning):
+    """The bus flies with an inertia that no mass distribution has."""
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A compiled vehicle and what a law, an actuator and the log need to know of it."""
+
+    model: Any  # the ``mujoco.MjModel``
+    inertia: Array
+    """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia,
+    body axes [kg m^2], shape (3, 3); wheel imbalance left out."""
+    wheel_axes: Array
+    """Unit spin axes, body axes, shape (n, 3)."""
+    wheel_inertia: Array
+    """Axial inertia of each rotor [kg m^2], shape (n,)."""
+    wheel_dof: Any
+    """Index of each wheel's speed in ``qvel``, shape (n,): reaction wheels, then driven ones."""
+    wheel_qpos: Any
+    """Index of each driven wheel's angle in ``qpos``, shape (d,)."""
+    gimbal_dof: Any
+    """Index of each driven gimbal's rate in ``qvel``, shape (g,)."""
+    gimbal_qpos: Any
+    """Index of each driven gimbal's angle in ``qpos``, shape (g,)."""
+    drive_dof: Any
+    """Index of each driven hinge's rate in ``qvel``, in the order of its motors, shape (m,)."""
+    strut_qpos: Any
+    """Index of each landing leg's strut in ``qpos``, shape (l,): positive where it is pressed."""
+    motors: tuple[str, ...]
+    """Names of the hinges that motors turn, then of the thrusters, in the order of ``ctrl``."""
+    torque_limit: float
+    """Largest motor torque [N m]; inf where there is none."""
+    speed_limit: float
+    """Largest wheel speed relative to the bus [rad/s]; inf where there is none."""
+    momentum: slice
+    """In ``sensordata``: total angular momentum about the centre of mass, inertial [N m s]."""
+    kinetic: slice
+    """In ``sensordata``: kinetic energy [J]."""
+    environment: slice
+    """In ``sensordata``: force [N], inertial axes, and torque [N m], body axes, on the bus."""
+
+
+def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
+    """Return the vehicle that ``table`` describes; its state has ``userdata`` numbers of user data.
+
+    Raises:
+        ValueError: an unknown model or part, wheels that leave no inertia for the bus or that no
+            rotor can be, or what ``guards.check`` refuses.
+
+    Warns:
+        UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown as given.
+    """
+    spec = composition.compose(table)
+    spec.option.timestep = rates.physics
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
+    spec.nuserdata = userdata
+
+    wheels = table.wheels
+    axes = mass_properties.unit_axes(wheels)
+    if table.vehicle_mass is not None:
+        gyrostat = np.array(table.vehicle_inertia)
+        inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, _others(spec))
+    else:
+        inertial, gyrostat = mass_properties.bus(table, mass_properties.own_inertia(spec.body("bus")))
+    model = _compile(spec, inertial)
+    model_checks.check(model)
+    driven = table.drives if table.servos is None else indices.turned(model)
+
+    return Vehicle(
+        model=model,
+        inertia=indices.frozen(gyrostat),
+        wheel_axes=indices.frozen(axes),
+        wheel_inertia=indices.frozen(np.full(len(axes), wheels.inertia)),
+        torque_limit=wheels.torque_limit or np.inf,
+        speed_limit=wheels.speed_limit or np.inf,
+        **indices.of(model, len(axes), driven, engine=table.engine is not None),
+    )
+
+
+def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
+    """Return ``vehicle`` on another compilation of it: the one that a log holds.
+
+    Raises:
+        KeyError: ``model`` lacks one of the vehicle's joints or sensors.
+    """
+    reaction_wheels = len(vehicle.wheel_axes)
+    hinges = [name for name in vehicle.motors if not indices.is_thruster(name)]
+    engine = tuple(hinges) == indices.ENGINE
+    driven = () if engine else hinges[reaction_wheels:]
+    found = indices.of(model, reaction_wheels, driven, engine=engine)
+    return replace(vehicle, model=model, **found)
+
+
+def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
+    """Return (qpos, qvel), shapes (nq,) and (nv,), of the vehicle at time zero.
+
+    Wheel speeds for a wanted total momentum are solved with MuJoCo's own momentum matrix, so that
+    they hold for wheels anywhere in the bus; where more than three wheels can make it, the least.
+
+    Raises:
+        ValueError: not one speed for each wheel, a speed above the limit, a joint that is not
+            there, or a momentum that the wheels' axes cannot make.
+
+    Warns:
+        guards.ModelWarning: a step too long for imbalanced wheels at the speed limit or, where
+            there is none, at the initial speed.
+    """
+    data = mujoco.MjData(vehicle.model)
+    wheels = vehicle.wheel_dof
+    data.qpos[0:3] = initial.position
+    if initial.attitude is not None:
+        data.qpos[3:7] = np.array(initial.attitude) / np.linalg.norm(initial.attitude)
+    elif initial.euler is not None:
+        mujoco.mju_euler2Quat(data.qpos[3:7], np.array(initial.euler), "XYZ")  # about fixed axes
+    data.qvel[0:3] = initial.velocity
+    data.qvel[3:6] = initial.rate
+    if initial.momentum is not None:
+        data.qvel[wheels] = _speeds_for(vehicle, data, np.array(initial.momentum))
+    elif initial.wheel_speed is not None:
+        if len(initial.wheel_speed) != len(wheels):
+            raise ValueError(
+                f"initial.wheel_speed: {len(initial.wheel_speed)} speeds for {len(wheels)} wheels"
+            )
+        data.qvel[wheels] = initial.wheel_speed
+    _set_joints(vehicle.model, data, initial)
+    fastest, limit = np.abs(data.qvel[wheels]).max(initial=0.0), vehicle.speed_limit
+    if fastest > limit:
+        raise ValueError(
+            f"initial: a wheel starts at {fastest:.6g} rad/s, above plant.wheels.speed_limit "
+            f"{limit:g} rad/s: start slower or raise the limit"
+        )
+    model_checks.check_imbalance(vehicle.model, limit if np.isfinite(limit) else fastest)
+    return data.qpos.copy(), data.qvel.copy()
+
+
+def _set_joints(model: Any, data: Any, initial: Initial) -> None:
+    known = {model.joint(i).name: i for i in range(1, model.njnt)}  # the free joint is the first
+    for name in (*initial.joint_position, *initial.joint_speed):
+        if name not in known:
+            raise ValueError(f"initial: no joint {name!r} among the parts: have {', '.join(known)}")
+    for name, value in initial.joint_position.items():
+        data.qpos[model.jnt_qposadr[known[name]]] = value
+    for name, value in initial.joint_speed.items():
+        data.qvel[model.jnt_dofadr[known[name]]] = value
+
+
+def to_bytes(model: Any) -> bytes:
+    """Return the compiled model as gzipped MJB: equal models give equal bytes."""
+    buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return gzip.compress(buffer.tobytes(), compresslevel=3, mtime=0)
+
+
+def from_bytes(data: bytes) -> Any:
+    """Return the ``mujoco.MjModel`` that ``to_bytes`` wrote."""
+    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": gzip.decompress(data)})
+
+
+def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
+    body, moments = spec.body("bus"), inertial.inertia
+    body.mass, body.ipos, _, body.iquat = inertial
+    body.fullinertia = np.full(6, np.nan)  # not given: the principal moments are
+    excess = moments[2] - moments[1] - moments[0]
+    # MuJoCo's compiler refuses what is not physical; its dynamics only need it positive.
+    body.inertia = moments if excess <= 0.0 else np.full(3, moments.mean())
+    model = spec.compile()
+    if excess > 0.0:
+        eigenvalues = np.array2string(moments, precision=4)
+        warnings.warn(
+            f"no mass distribution has the bus inertia's eigenvalues {eigenvalues} kg m^2: the "
+            f"largest exceeds the sum of the others by {excess:.4g}; flown as given",
+            UnphysicalInertiaWarning,
+            stacklevel=3,
+        )
+        model.body("bus").inertia = moments
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def _others(spec: Any) -> list[mass_properties.Inertial]:
+    """Return what else than the bus has mass, in the bus's axes, joints at rest."""
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    bus = model.body("bus").id
+    axes, origin = data.xmat[bus].reshape(3, 3), data.xpos[bus]
+    others = []
+    for body in range(1, model.nbody):
+        if body != bus and model.body_rootid[body] == bus and model.body_mass[body] > 0.0:
+            quat = np.zeros(4)
+            mujoco.mju_mat2Quat(quat, (axes.T @ data.ximat[body].reshape(3, 3)).ravel())
+            place = axes.T @ (data.xipos[body] - origin)
+            moments = model.body_inertia[body].copy()
+            others.append(mass_properties.Inertial(float(model.body_mass[body]), place, moments, quat))
+    return others
+
+
+def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
+    """Return the wheel speeds [rad/s] for a total ``momentum`` [N m s], inertial axes."""
+    bus = vehicle.model.body("bus").id
+    matrix = np.zeros((3, vehicle.model.nv))
+    mujoco.mj_fwdPosition(vehicle.model, data)
+    mujoco.mj_angmomMat(vehicle.model, data, matrix, bus)
+    by_wheels = matrix[:, vehicle.wheel_dof]
+    wanted = momentum - matrix @ data.qvel
+    speeds: Array = np.linalg.lstsq(by_wheels, wanted, rcond=1e-10)[0]
+    missing = wanted - by_wheels @ speeds
+    if np.linalg.norm(missing) > 1e-9 * np.linalg.norm(wanted):
+        in_body = data.xmat[bus].reshape(3, 3).T @ missing
+        raise ValueError(
+            f"initial.momentum: the wheels' axes cannot make {in_body} N m s of it (body axes): "
+            f"give wheel_speed, or plant.wheels.axes that span it"
+        )
+    return speeds

@@ -1,0 +1,105 @@
+"""Actuators of two kinds at once: each obeys its own field of the command, and both act."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import simpson
+
+from mjspace import attitude
+from mjspace.simulation.assembly import assemble
+from mjspace.actuators.actuator_set import Together
+from mjspace.contract import Measurement, TorqueCommand
+from mjspace.errors import FlightError
+from mjspace.runner.run import run
+from mjspace.scenario.loading import load
+from mjspace.actuators.reaction_wheels import ReactionWheels
+from mjspace.runner.replay import verify
+from mjspace.simulation.loop import fly
+from mjspace.simulation.initial_state import first_start
+
+TRUTH = Measurement(np.array([[1.0, 0.0, 0.0, 0.0]] * 2), np.zeros((2, 3)), np.zeros((2, 3)))
+LAW = """
+from typing import NamedTuple
+import numpy as np
+
+class Command(NamedTuple):
+    torque: np.ndarray
+    thruster_torque: np.ndarray
+
+class Both:
+    batched = True
+    def reset(self, measurement, reference):
+        return ()
+    def step(self, state, time, measurement, reference):
+        one = np.ones_like(measurement.rate)
+        return state, Command([0.3, 0.0, 0.0] * one, [0.0, 0.02, 0.01] * one), ()
+"""
+BOTH = ["plant.ideal_thrusters=true", "environment.torques=[]", "duration=2", "checks=[]"]
+
+
+@pytest.fixture
+def overrides(tmp_path: Path) -> list[str]:
+    (tmp_path / "law.py").write_text(LAW)
+    return [*BOTH, f"law={{kind='{tmp_path}/law.py:Both'}}"]
+
+
+def test_wheels_exchange_momentum_and_thrusters_bring_it(
+    overrides: list[str], tmp_path: Path
+) -> None:
+    flown = run("dgvscmg-against-wheels", overrides=overrides, out=tmp_path / "flight")
+    truth, command = flown.log.read("/truth"), flown.log.read("/command")
+    np.testing.assert_array_equal(command["wheel_torque"][5], [-0.3, 0.0, 0.0])
+    np.testing.assert_array_equal(command["thruster_torque"][5], [0.0, 0.02, 0.01])
+    brought = truth["momentum"][-1] - truth["momentum"][0]
+    # The thrusters' torque is held in body axes; no wheel changes the total.
+    torque = attitude.rotate(truth["attitude"], [0.0, 0.02, 0.01] * np.ones_like(truth["rate"]))
+    due = simpson(torque, x=truth["time"], axis=0)
+    np.testing.assert_allclose(brought, due, atol=1e-14)  # 1e-15 measured
+    # About its own axis a rotor has its motor's torque alone.
+    turning = truth["wheel_speed"] + truth["rate"]
+    spun = 0.016 * (turning[-1] - turning[0])
+    np.testing.assert_allclose(spun, [-0.6, 0.0, 0.0], atol=1e-14)  # 3e-16 measured
+    assert verify(flown.path) is None
+
+
+def test_a_batch_is_as_one(overrides: list[str]) -> None:
+    built = assemble(*load("dgvscmg-against-wheels", [*overrides, "duration=0.05"]))
+    (one,), (many,) = (list(fly(built, first_start(built, range(n)), range(n))) for n in (1, 3))
+    for vehicle in range(3):
+        alone, beside = one.rows["/state"]["physics"][:, 0], many.rows["/state"]["physics"]
+        np.testing.assert_array_equal(beside[:, vehicle], alone)
+
+
+def test_a_law_that_forgets_one_is_told_so() -> None:
+    built = assemble(*load("dgvscmg-against-wheels", BOTH))
+    message = (
+        r"the law's command, a TorqueCommand, has no field 'thruster_torque': it must be of shape "
+        r"\(\.\.\., 3\) \[N m\]; its fields are: torque$"
+    )
+    with pytest.raises(FlightError, match=message):
+        list(fly(built, first_start(built, [0])))
+
+
+@pytest.mark.parametrize(
+    ("torque", "message"),
+    [
+        (np.zeros((2, 4)), r"torque has shape \(\.\.\., 4\): it must be of shape \(\.\.\., 3\)"),
+        (np.zeros(3), r"torque has shape \(3,\): it must be of shape \(\.\.\., 3\) \[N m\]"),
+        ([["a"] * 3] * 2, r"torque is not numbers \(could not convert .*\): it must be of shape"),
+    ],
+)
+def test_a_misshapen_command_is_the_laws_fault(torque: Any, message: str) -> None:
+    together = Together((ReactionWheels(np.eye(3)),))
+    with pytest.raises(FlightError, match=f"the law's command: {message}"):
+        together.act({}, TorqueCommand(torque), TRUTH, 0.1)
+
+
+def test_what_an_actuator_raises_is_not_blamed_on_the_law() -> None:
+    class Broken(ReactionWheels):
+        def act(self, state: Any, command: Any, truth: Any, step: float) -> Any:
+            raise KeyError("its own")
+
+    with pytest.raises(KeyError, match="its own"):
+        Together((Broken(np.eye(3)),)).act({}, TorqueCommand(np.zeros((2, 3))), TRUTH, 0.1)

@@ -1,0 +1,183 @@
+"""Reaction-control thrusters: pulses, lag, tank and composition, against closed forms."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mjspace.constants import STANDARD_GRAVITY
+from mjspace.contract import Array, Measurement, PulseCommand
+from mjspace.vehicle.vehicle import build, on_model
+from mjspace.scenario.thrusters import Rcs
+from mjspace.scenario.plant import PlantTable, Rates
+from mjspace.actuators.thrusters import Thrusters
+
+STEP, PERIOD, FORCE = 0.005, 0.02, 2.0  # s, s, N
+TANK = """<mujoco><worldbody><body name="rcs_tank">
+  <inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"""
+NOTHING = np.zeros((1, 0))
+TRUTH = Measurement(NOTHING, NOTHING, NOTHING, thrust=NOTHING, propellant=NOTHING)
+
+
+def thrusters(count: int = 1, **table: Any) -> Thrusters:
+    rows = [[0.0, 0.0, 0.0]] * count
+    given = Rcs(positions=rows, directions=[[1.0, 0.0, 0.0]] * count, thrust=FORCE, **table)
+    vehicle: Any = SimpleNamespace(model=mujoco.MjModel.from_xml_string(TANK))
+    return Thrusters.of(vehicle, given, Rates(physics=STEP, control=PERIOD))
+
+
+def fire(flown: Thrusters, on_times: list[float], periods: int) -> tuple[Any, Array, Array]:
+    """Return (state, impulse of each step [N s], whether cut) for pulses and then nothing."""
+    state, impulses, cuts = flown.reset(1), [], []
+    for on in [*on_times, *[0.0] * (periods - len(on_times))]:
+        for _ in range(4):
+            command = PulseCommand(np.array([[on]]))
+            state, mean, cut = flown.act(state, command, TRUTH, STEP)
+            impulses.append(mean[0, 0] * STEP)
+            cuts.append(cut[0, 0])
+    return state, np.array(impulses), np.array(cuts)
+
+
+def test_a_valve_that_closes_within_a_step_gives_that_part_of_its_thrust() -> None:
+    state, impulse, cut = fire(thrusters(), [0.0125], 2)
+    np.testing.assert_allclose(impulse / FORCE, [0.005, 0.005, 0.0025, *[0.0] * 5], atol=1e-15)
+    assert state["rcs_on_time"][0, 0] == pytest.approx(0.0125, rel=1e-12)
+    assert not cut.any()
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.003, 0.0125, 0.02, 0.033, 0.05])
+def test_a_pulse_comes_late_by_the_delay_and_whole(delay: float) -> None:
+    _, impulse, _ = fire(thrusters(delay=delay), [0.0125, 0.0, 0.004], 7)
+    edges = STEP * np.arange(len(impulse) + 1)
+    wanted = sum(
+        np.diff(np.clip(edges - begin - delay, 0.0, on))
+        for begin, on in ((0.0, 0.0125), (0.04, 0.004))
+    )
+    np.testing.assert_allclose(impulse / FORCE, wanted, atol=1e-14)
+
+
+def test_whole_periods_join_into_one_pulse() -> None:
+    # seen by the least pulse: it counts from the first of them
+    flown = thrusters(delay=0.0033, minimum_on=0.05)
+    state, impulse, _ = fire(flown, [PERIOD] * 3, 6)
+    assert impulse.sum() / FORCE == pytest.approx(3 * PERIOD, rel=1e-12)
+    assert state["rcs_open"][0, 0] == 0.0
+
+
+def test_a_short_pulse_is_lengthened_even_over_the_next_period() -> None:
+    state, impulse, cut = fire(thrusters(minimum_on=0.033), [0.002], 4)
+    np.testing.assert_allclose(impulse / FORCE, [*[0.005] * 6, 0.003, *[0.0] * 9], atol=1e-15)
+    assert cut[:4].all()
+    assert not cut[4:].any()
+    assert state["rcs_on_time"][0, 0] == pytest.approx(0.033, rel=1e-12)
+
+
+def test_thrust_follows_its_valve_with_the_lag_and_no_impulse_is_lost() -> None:
+    lag, on = 0.01, 0.0125
+    state, impulse, _ = fire(thrusters(rise=lag), [on], 30)
+    time = STEP * np.arange(121)
+    # the impulse of a step response, less that of one that begins when the valve closes
+    response = [
+        np.where(t > 0.0, t - lag * (1.0 - np.exp(-np.maximum(t, 0.0) / lag)), 0.0)
+        for t in (time, time - on)
+    ]
+    np.testing.assert_allclose(impulse / FORCE, np.diff(response[0] - response[1]), atol=1e-14)
+    assert impulse.sum() == pytest.approx(FORCE * on, rel=1e-12)
+    assert state["rcs_thrust"][0, 0] < 1e-20
+
+
+def test_propellant_goes_with_impulse_over_exhaust_speed() -> None:
+    flown = thrusters(specific_impulse=220.0, propellant=0.5, rise=0.004)
+    state, impulse, _ = fire(flown, [0.0125, 0.02, 0.003], 20)
+    used = 0.5 - state["rcs_propellant"][0, 0]
+    assert used == pytest.approx(impulse.sum() / (220.0 * STANDARD_GRAVITY), rel=1e-9)
+    assert flown.masses(state, state)["body_mass"][1] == state["rcs_propellant"][0]
+    np.testing.assert_allclose(
+        flown.masses(state, state)["body_inertia"][1], 0.02 * state["rcs_propellant"] * np.ones(3)
+    )
+    assert flown.seen(state, TRUTH).propellant == state["rcs_propellant"]
+
+
+def test_an_empty_tank_ends_it_with_its_last_gram() -> None:
+    flown = thrusters(specific_impulse=220.0, propellant=1e-5)
+    state, impulse, cut = fire(flown, [PERIOD] * 3, 4)
+    assert impulse.sum() == pytest.approx(1e-5 * 220.0 * STANDARD_GRAVITY, rel=1e-12)
+    assert state["rcs_propellant"][0, 0] == 0.0
+    assert state["rcs_thrust"][0, 0] == 0.0
+    assert cut[8]  # 0.0108 s of thrust were in it
+
+
+def test_what_burns_nothing_weighs_the_same() -> None:
+    flown = thrusters()
+    assert flown.masses(flown.reset(1), flown.reset(1)) == {}
+    assert flown.seen(flown.reset(1), TRUTH).propellant.size == 0
+
+
+def test_what_no_period_holds_is_cut() -> None:
+    _, impulse, cut = fire(thrusters(), [-0.01, 0.5], 3)
+    np.testing.assert_allclose(impulse / FORCE, [*[0.0] * 4, *[STEP] * 4, *[0.0] * 4])
+    assert cut.tolist() == [1.0] * 8 + [0.0] * 4
+
+
+def test_a_batch_is_its_vehicles() -> None:
+    flown = thrusters(
+        3, specific_impulse=220.0, propellant=2e-5, rise=0.01, delay=0.013, minimum_on=0.007
+    )
+    random = np.random.default_rng(2)
+    every, alone = flown.reset(4), [flown.reset(1) for _ in range(4)]
+    for _ in range(8):
+        on_time = random.uniform(-0.01, 0.025, (4, 3))
+        for _ in range(4):
+            every, mean, _ = flown.act(every, PulseCommand(on_time), TRUTH, STEP)
+            for i in range(4):
+                one = PulseCommand(on_time[i : i + 1])
+                alone[i], mean_one, _ = flown.act(alone[i], one, TRUTH, STEP)
+                np.testing.assert_array_equal(mean[i], mean_one[0])
+    for name, values in every.items():
+        np.testing.assert_array_equal(values, np.concatenate([one[name] for one in alone]))
+    assert (every["rcs_propellant"] == 0.0).any()
+
+
+RCS = Rcs(
+    positions=[[0.4, 0.0, 0.5], [0.0, -0.4, 0.1]],
+    directions=[[2.0, 0.0, 0.0], [0.0, 3.0, 4.0]],
+    thrust=FORCE,
+    specific_impulse=220.0,
+    propellant=0.7,
+)
+
+
+@pytest.mark.parametrize("axes", [[], [[1, 0, 0], [0, 0, 1]]], ids=["alone", "beside wheels"])
+def test_a_thruster_pushes_where_it_is_and_along_its_direction(axes: Any) -> None:
+    table = PlantTable(wheels={"axes": axes}, rcs=RCS, bus_inertia=np.diag([15.0, 12.0, 18.0]))
+    vehicle = build(table, Rates(), userdata=0)
+    assert vehicle.motors == (*(f"wheel_{i}" for i in range(len(axes))), "thruster_0", "thruster_1")
+    assert on_model(vehicle, vehicle.model).motors == vehicle.motors
+    model, data = vehicle.model, mujoco.MjData(vehicle.model)
+    data.qpos[3:7] = np.array([1.0, 2.0, -1.0, 0.5]) / 2.5
+    data.ctrl[-2:] = 0.5, 1.5
+    mujoco.mj_forward(model, data)
+    force = np.array([0.5, 0.9, 1.2])
+    torque = np.cross([0.4, 0.0, 0.5], [0.5, 0.0, 0.0]) + np.cross([0.0, -0.4, 0.1], [0, 0.9, 1.2])
+    to_inertial = data.body("bus").xmat.reshape(3, 3)
+    np.testing.assert_allclose(data.qfrc_actuator[:3], to_inertial @ force, rtol=1e-13)
+    np.testing.assert_allclose(data.qfrc_actuator[3:6], torque, atol=1e-14)
+    # hydrazine at 1010 kg/m^3: a sphere of radius 54.9 mm
+    assert model.body("rcs_tank").mass[0] == 0.7
+    np.testing.assert_allclose(model.body("rcs_tank").inertia, 0.4 * 0.7 * 0.05490**2, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"directions": [[1, 0, 0]]}, "1 rows for 2 positions"),
+        ({"directions": [[1, 0, 0], [0, 0, 0]]}, "which has no direction"),
+        ({"propellant": None}, "give both or neither"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        Rcs(**(RCS.model_dump() | change))

@@ -1,0 +1,96 @@
+"""Thrusters in the loop: what they bring, what it costs, beside wheels, again from the log."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from mjspace.simulation.assembly import assemble
+from mjspace.constants import STANDARD_GRAVITY
+from mjspace.runner.run import run
+from mjspace.scenario.loading import load
+from mjspace.runner.replay import verify
+from mjspace.simulation.loop import fly
+from mjspace.rendering.scene import Stage
+from mjspace.simulation.initial_state import first_start
+
+# Pulses that are longer than a period, under way between two, and closed within a step.
+LAW = """
+from typing import NamedTuple
+import numpy as np
+
+class Command(NamedTuple):
+    torque: np.ndarray
+    on_time: np.ndarray
+
+class Both:
+    batched = True
+    def reset(self, measurement, reference):
+        return ()
+    def step(self, state, time, measurement, reference):
+        on = np.zeros((*measurement.rate.shape[:-1], 12))
+        on[..., 4:6] = 0.037 if time < 0.45 else 0.0
+        wheels = [0.3, 0.0, 0.0] * np.ones_like(measurement.rate)
+        return state, Command(wheels, on), ()
+"""
+RCS = [
+    *("duration=1", "checks=[]", "rates.control='50 ms'", "plant.rcs.delay='63 ms'"),
+    *("plant.rcs.rise='20 ms'", "initial.euler=[0, 0, 0]"),
+]
+
+
+def test_they_turn_the_bus_beside_wheels_and_burn_for_it(tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text(LAW)
+    own = [f"law={{kind='{tmp_path}/law.py:Both'}}", "plant.wheels.axes=[[1,0,0]]"]
+    flown = run("rcs-three-axis", overrides=[*RCS, *own], out=tmp_path / "flight")
+    truth, state = flown.log.read("/truth"), flown.log.read("/state")
+    on = 9 * 0.037
+    np.testing.assert_allclose(state["actuator_rcs_on_time"][-1], on * (np.eye(12)[4:6].sum(0)))
+    # two of 0.5 N on levers of 0.5 m; the body has turned by 0.02 rad
+    np.testing.assert_allclose(truth["momentum"][-1], [0.0, 0.5 * on, 0.0], atol=3e-3)
+    np.testing.assert_allclose(truth["momentum"][-1, 1], 0.5 * on, rtol=1e-3)
+    np.testing.assert_allclose(truth["velocity"][-1], 0.0, atol=1e-15)
+    used = 1.0 - truth["propellant"][-1, 0]
+    np.testing.assert_allclose(used, 2 * 0.5 * on / (220.0 * STANDARD_GRAVITY), rtol=1e-6)
+    assert truth["thrust"][-1].max() < 1e-7
+    assert truth["wheel_speed"][-1, 0] < -5.0
+    assert verify(flown.path) is None
+    assert verify(flown.path, start=0.3) is None
+
+
+def test_a_batch_is_as_one_and_its_tanks_empty() -> None:
+    built = assemble(*load("detumble-thrusters", ["duration=0.5", "checks=[]"]))
+    (one,), (many,) = (list(fly(built, first_start(built, range(n)), range(n))) for n in (1, 3))
+    for topic in ("/state", "/truth", "/command"):
+        for name, alone in one.rows[topic].items():
+            for vehicle in range(3):
+                np.testing.assert_array_equal(many.rows[topic][name][:, vehicle], alone[:, 0])
+    assert 0.99 < one.rows["/truth"]["propellant"][-1, 0, 0] < 0.9999
+
+
+def test_a_picture_shows_the_plumes_of_those_that_are_on() -> None:
+    built = assemble(*load("detumble-thrusters"))
+    model, start = built.vehicle.model, first_start(built, [0])
+    stage = Stage(model, "chase", None)
+    on_time = np.zeros(12)
+    on_time[[3, 7]] = 0.01
+    stage.set(0.0, start.physics[0], np.array([1.0, 0.0, 0.0, 0.0]), on_time)
+    shown = [i for i in range(12) if model.geom(f"thruster_{i}_plume").rgba[3] > 0.0]
+    assert shown == [3, 7]
+    # the third pushes up at the bottom edge: its plume points down
+    plume = model.geom("thruster_2_plume")
+    np.testing.assert_allclose(plume.pos, [0.0, -0.4, -0.8], atol=1e-12)
+
+
+def test_a_lander_may_have_them_beside_its_engine() -> None:
+    rcs = "plant.rcs={positions=[[0.6,0,0],[-0.6,0,0]],directions=[[0,1,0],[0,-1,0]],thrust=5}"
+    built = assemble(*load("lander", [rcs]))
+    assert built.vehicle.motors[-2:] == ("thruster_0", "thruster_1")
+    assert [kind.logged_as for kind in built.actuators.kinds] == ["engine", "thruster_thrust"]
+    model = built.vehicle.model
+    assert mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "rcs_tank") < 0
+    state = built.actuators.reset(1)
+    assert [name for name, *_ in built.actuators.masses(state, state)] == [
+        "body_mass",
+        "body_inertia",
+    ]

@@ -1,0 +1,347 @@
+"""Scenarios as dm_control environments: the same flights, the contract of dm_env, no display."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+from unittest import TestCase
+
+import mujoco
+import numpy as np
+import pytest
+
+pytest.importorskip("dm_control")
+
+from dm_env import StepType, TimeStep, test_utils
+
+from mjspace.dm_env import environment as environments
+from mjspace.simulation.assembly import assemble
+from mjspace.contract import Measurement, Reference
+from mjspace.errors import InputError
+from mjspace.vehicle.model_checks import ModelWarning
+from mjspace.scenario.loading import load, scenario_names
+from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
+from mjspace.simulation.loop import fly
+from mjspace.simulation.initial_state import INTEGRATION, first_start
+
+pytestmark = [
+    pytest.mark.filterwarnings(f"ignore::{kind.__module__}.{kind.__name__}")
+    for kind in (UnphysicalInertiaWarning, ModelWarning)
+]
+
+SHORT = "duration=0.048"  # a whole number of all control periods here
+NOISY = [
+    "sensors.rate.noise=0.01",
+    "sensors.rate.bias_walk=0.001",
+    "sensors.rate.period='3 ms'",
+    "sensors.attitude.noise=1e-4",
+    "sensors.attitude.delay='8 ms'",
+    "sensors.wheel_speed.quantization=0.1",
+    "plant.wheels.torque_limit=5",
+    "plant.wheels.coulomb_friction=0.01",
+    "plant.wheels.static_imbalance=1e-4",
+    "rates.control='4 ms'",
+]
+WIND = """
+def wind(time, truth):
+    return [time, 0.0, 1.0], truth.rate * [1.0, 2.0, 3.0] - time
+"""
+
+
+def wheeled(name: str) -> bool:
+    scenario, _ = load(name)
+    plant = scenario.plant
+    others = plant.rcs or plant.magnetorquers or plant.ideal_thrusters
+    deployed = any(part.deployment for part in plant.parts.values())
+    return bool(plant.wheels.axes) and not (others or deployed or scenario.faults)
+
+
+class _Conformance(test_utils.EnvironmentTestMixin):
+    """dm_env's own tests: each runs two episodes and begins a third."""
+
+    scenario: str
+    overrides: Sequence[str] = ()
+
+    def make_object_under_test(self) -> Any:
+        return environments.load(self.scenario, [SHORT, *self.overrides])
+
+    def make_action_sequence(self) -> Iterator[np.ndarray]:
+        spec = self.environment.action_spec()
+        random = np.random.default_rng(1)
+        for _ in range(60):
+            yield random.uniform(spec.minimum, spec.maximum)
+
+
+class TestIdeal(_Conformance, TestCase):
+    scenario = "contraction-adaptive"
+
+
+class TestNoisy(_Conformance, TestCase):
+    scenario = "contraction-noise"
+    overrides = NOISY
+
+
+class TestManoeuvreAsPrinted(_Conformance, TestCase):
+    scenario = "immersion-invariance"
+
+
+class TestDivergence(_Conformance, TestCase):
+    scenario = "contraction-ideal"
+
+    def make_action_sequence(self) -> Iterator[np.ndarray]:
+        for index in range(60):
+            yield np.full(3, np.nan if index % 7 == 3 else 1e9)
+
+
+@pytest.mark.parametrize("scenario", [name for name in scenario_names() if wheeled(name)])
+def test_every_scenario_with_reaction_wheels_is_an_environment(scenario: str) -> None:
+    environment = environments.load(scenario)
+    environment.reset()
+    step = environment.step(np.zeros(3))
+    assert step.mid()
+    assert 0.0 < step.reward <= 1.0
+
+
+@pytest.mark.parametrize("scenario", ["wheel-failure", "mission"])
+def test_what_goes_wrong_or_out_makes_no_environment(scenario: str) -> None:
+    with pytest.raises(InputError, match="faults and deployments: an environment has none"):
+        environments.load(scenario)
+
+
+@pytest.mark.parametrize("scenario", ["dgvscmg-tracking", "pd-plus"])
+def test_other_motors_make_no_environment(scenario: str) -> None:
+    with pytest.raises(InputError, match="a torque for reaction wheels"):
+        environments.load(scenario)
+
+
+def seen(step: TimeStep) -> tuple[Measurement, Reference]:
+    """Return what a law sees, with the measurement's vehicle axis."""
+    observation = step.observation
+    return (
+        Measurement(*(observation[n][None] for n in Measurement._fields if n in observation)),
+        Reference(*(observation[f"reference_{name}"] for name in Reference._fields)),
+    )
+
+
+def fly_law(environment: Any, law: Any) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Fly an episode under ``law`` and return the states and the measurements."""
+    step, memory = environment.reset(), None
+    states, measurements = [], []
+    while True:
+        states.append(environment.physics.get_state(INTEGRATION))
+        measurement, reference = seen(step)
+        measurements.append(np.concatenate([m for m in measurement if m.size], axis=1)[0])
+        if step.last():
+            return states, measurements
+        if memory is None:
+            memory = law.reset(measurement, reference)
+        time = environment.physics.time()
+        memory, command, _ = law.step(memory, time, measurement, reference)
+        step = environment.step(command.torque[0])
+
+
+@pytest.mark.parametrize(
+    ("scenario", "overrides"),
+    [
+        ("contraction-adaptive", [SHORT]),
+        ("contraction-noise", ["duration=0.1", *NOISY]),
+        ("contraction-ideal", [SHORT, "rates.control='2 ms'", "rates.integrator='Euler'"]),
+        (
+            "contraction-ideal",
+            [
+                "duration=0.045",
+                "rates.control='5 ms'",
+                "environment.python='wind.py:wind'",
+                "environment.torques=[{bias=[1,2,3]}]",
+                "environment.orbit.semi_major_axis=7e6",
+            ],
+        ),
+        ("immersion-invariance", ["duration=0.55"]),  # more than a block of references
+    ],
+    ids=["ideal", "noisy", "euler", "disturbed", "long"],
+)
+def test_the_law_flies_the_same_flight_bit_for_bit(
+    scenario: str, overrides: list[str], tmp_path: Path
+) -> None:
+    (tmp_path / "wind.py").write_text(WIND)
+    overrides = [text.replace("wind.py", str(tmp_path / "wind.py")) for text in overrides]
+    built = assemble(*load(scenario, overrides))
+    blocks = list(fly(built, first_start(built, [0])))
+    physics = np.concatenate([block.rows["/state"]["physics"][:, 0] for block in blocks])
+    reports = [block.rows["/measurement"] for block in blocks]
+    logged = [name for name in Measurement._fields if name in reports[0]]
+    measured = np.concatenate(
+        [np.concatenate([report[n][:, 0] for n in logged], 1) for report in reports]
+    )
+    environment = environments.load(scenario, overrides)
+    for _ in range(2):  # the second episode starts where the first did
+        states, measurements = fly_law(environment, built.law)
+        assert np.array(states).tobytes() == physics.tobytes()
+        assert np.array(measurements).tobytes() == measured.tobytes()
+
+
+def at_rest(*overrides: str) -> Any:
+    """Return a spacecraft at rest, 2 deg from the attitude that it is to hold."""
+    return environments.load(
+        "contraction-regulation",
+        [
+            SHORT,
+            "law={kind='contraction:Ideal', rate_gain=25, attitude_gain=25}",
+            "reference={kind='references:Hold'}",
+            "initial={euler=['2 deg', 0, 0]}",
+            *overrides,
+        ],
+    )
+
+
+def test_the_action_is_the_torque_on_the_bus() -> None:
+    environment = at_rest()
+    environment.reset()
+    torque = np.array([0.3, -0.2, 0.1])
+    observation = environment.step(torque).observation
+    inertia = np.array([[15, 5, 5], [5, 10, 7], [5, 7, 20]])
+    # From rest, H rate = torque t but for the wheels' gyroscopic torque, of order rate^2 = 1e-9.
+    np.testing.assert_allclose(inertia @ observation["rate"], torque * 1e-3, rtol=0, atol=1e-9)
+
+
+def test_the_action_is_bounded_by_what_the_wheels_give() -> None:
+    axes = "[[1,0,0],[0,1,0],[0,0,1],[1,1,1]]"
+    environment = at_rest("plant.wheels.torque_limit=5", f"plant.wheels.axes={axes}")
+    spec = environment.action_spec()
+    # About each axis: its own wheel and the skewed one, at an angle of cosine 1/sqrt(3).
+    np.testing.assert_allclose(spec.maximum, 5 + 5 / np.sqrt(3), rtol=1e-15)
+    np.testing.assert_array_equal(spec.minimum, -spec.maximum)
+    environment.reset()
+    environment.step(2 * spec.maximum)
+    np.testing.assert_array_equal(environment.physics.control(), np.full(4, -5.0))
+    free = at_rest().action_spec()
+    assert free.maximum == pytest.approx(np.full(3, 2734.324), rel=1e-6)  # 100 x 27.34324 kg m^2
+
+
+@pytest.mark.parametrize(
+    ("checks", "rewards"),
+    [
+        # Time: 0.001, 0.02, 0.03 and 0.04 s. The error is 2 deg throughout.
+        ("[]", [1 / 2, 1 / 2, 1 / 2, 1 / 2]),
+        ("[{name='a', signal='truth.attitude_error', below='3 deg'}]", [1, 1, 1, 1]),
+        (
+            "[{name='a', signal='truth.attitude_error', below='0.5 deg'},"
+            "{name='b', signal='/truth.attitude_error[0]', statistic='peak', below='0.1 deg',"
+            "start=0.0195, end=0.0305},"
+            "{name='c', signal='truth.attitude_error', statistic='rms', below='1e-9 deg'},"
+            "{name='d', signal='truth.attitude_error', target=1, below='1e-9 deg'},"
+            "{name='e', signal='truth.attitude_error', above=0},"
+            "{name='f', signal='truth.rate', below=1e-9}]",
+            [1 / 4, 1 / 20, 1 / 20, 1 / 4],
+        ),
+    ],
+)
+def test_the_reward_is_the_tightest_bound_over_the_error(checks: str, rewards: list[float]) -> None:
+    # Of the true error: the star tracker's say nothing of it.
+    environment = at_rest(f"checks={checks}", "sensors.attitude.noise=0.1")
+    environment.reset()
+    earned = [environment.step(np.zeros(3)).reward for _ in range(50)]
+    # At rest and without torque nothing moves, but for rounding.
+    np.testing.assert_allclose([earned[k - 1] for k in (1, 20, 30, 40)], rewards, rtol=1e-12)
+
+
+def test_readings_are_of_the_instant_of_the_state() -> None:
+    environment = at_rest("environment.torques=[{frame='inertial', bias=[1,2,3]}]")
+    mujoco.set_mjcb_passive(None)  # as other users of MuJoCo in this process may leave it
+    environment.reset()
+    start = environment.physics.momentum()
+    for _ in range(10):
+        observation = environment.step(np.zeros(3)).observation
+    physics = environment.physics
+    # A constant inertial torque: H0 + M t exactly; readings a step old would be 3e-3 off.
+    np.testing.assert_allclose(physics.momentum() - start, [0.01, 0.02, 0.03], atol=1e-12)
+    np.testing.assert_array_equal(physics.truth().attitude, observation["attitude"])
+    np.testing.assert_array_equal(physics.named.data.xquat["bus"], observation["attitude"])
+
+
+def test_an_observation_is_the_agents_own() -> None:
+    environment = environments.load("contraction-noise", [SHORT, *NOISY])
+    first = environment.reset().observation
+    kept = {name: values.copy() for name, values in first.items()}
+    environment.step(np.ones(3))
+    for name, values in first.items():
+        np.testing.assert_array_equal(values, kept[name])
+        values[:] = 7.0
+    for name, values in environment.reset().observation.items():
+        np.testing.assert_array_equal(values, kept[name])
+
+
+def test_an_episode_ends_with_the_scenario() -> None:
+    environment = environments.load("contraction-adaptive", ["duration=0.3", "rates.control=0.1"])
+    environment.reset()
+    steps = [environment.step(np.zeros(3)) for _ in range(4)]
+    assert [step.step_type for step in steps] == [
+        StepType.MID,
+        StepType.MID,
+        StepType.LAST,
+        StepType.FIRST,
+    ]
+    assert steps[2].discount == 1.0  # out of time, not out of bounds: the value goes on
+    assert environment.control_timestep() == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("action", [np.nan, np.inf, 1e300, 1e11])
+def test_an_episode_ends_where_the_state_is_not_finite(action: float) -> None:
+    environment = environments.load("contraction-adaptive", [SHORT])
+    start = environment.reset()
+    for _ in range(3):
+        step = environment.step(np.full(3, action))
+        if step.last():
+            break
+    assert step.last()
+    assert (step.reward, step.discount) == (0.0, 0.0)
+    again = environment.step(np.zeros(3))
+    assert again.first()
+    for name, values in start.observation.items():
+        np.testing.assert_array_equal(again.observation[name], values)
+    assert not environment.step(np.zeros(3)).last()
+
+
+def run_python(code: str) -> str:
+    """Return what ``code`` prints, without MUJOCO_GL and with every warning but ours an error."""
+    command = [sys.executable, "-W", "error", "-W", "ignore::UserWarning", "-c", code]
+    environ = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
+    done = subprocess.run(command, capture_output=True, text=True, env=environ, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_flight_does_not_import_dm_control(tmp_path: Path) -> None:
+    loaded = run_python(
+        "import sys, mjspace.cli, mjspace.replay, mjspace.flight\n"
+        f"mjspace.runner.run.run('contraction-ideal', overrides=['{SHORT}'], out={str(tmp_path)!r})\n"
+        "print(sorted(name for name in sys.modules if name.startswith(('dm_', 'absl'))))"
+    )
+    assert loaded.strip() == "[]"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere dm_control makes its own choice")
+def test_works_without_any_opengl() -> None:
+    """OpenGL's Python package failing as it does where there is no library behind it."""
+    said = run_python(
+        "import os, sys\n"
+        "class Broken:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'OpenGL.platform': raise AttributeError('no glGetError')\n"
+        "sys.meta_path.insert(0, Broken())\n"
+        "from mjspace import environments\n"
+        "from dm_control import _render\n"
+        f"environment = environments.load('contraction-ideal', ['{SHORT}'])\n"
+        "environment.reset(); environment.step([0.0, 0.0, 0.0])\n"
+        "print(_render.BACKEND, os.environ.get('MUJOCO_GL'))"
+    )
+    assert said.split() == ["off", "None"]
+
+
+def test_the_page_runs() -> None:
+    page = Path(__file__).parents[2] / "docs" / "dm_control.md"
+    for snippet in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
+        exec(compile(snippet, str(page), "exec"), {})

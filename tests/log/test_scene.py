@@ -1,0 +1,218 @@
+"""The shapes that viewers draw are those of the compiled model, in the frames that /tf moves."""
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mjspace.contract import Array
+from mjspace.log.foxglove_layout import layout
+from mjspace.log.scene import scene
+from mjspace.log.schema import PERIODIC
+
+TETRAHEDRON = "0 0 0  1 0 0  0 1 0  0 0 1"
+MODEL = f"""
+<mujoco>
+  <asset>
+    <material name="foil" rgba="0.75 0.5 0.25 1"/>
+    <mesh name="tetrahedron" vertex="{TETRAHEDRON}" scale="0.5 0.5 0.5"/>
+  </asset>
+  <worldbody>
+    <geom type="sphere" size="0.1"/>
+    <body name="bus">
+      <freejoint/>
+      <geom name="box" type="box" material="foil" size="1 0.5 0.25" pos="0.1 0.2 0.3"/>
+      <geom name="lens" type="ellipsoid" material="foil" size="0.1 0.2 0.4" rgba="0 1 0 0.5"/>
+      <geom name="hull" type="box" size="2 2 2" group="3"/>
+      <geom name="glass" type="box" size="2 2 2" rgba="1 1 1 0"/>
+      <geom name="plate" type="mesh" mesh="tetrahedron" pos="1 2 3"/>
+      <body name="wheel_0" pos="2 0 0">
+        <joint axis="1 0 0"/>
+        <geom type="cylinder" size="0.5 0.1" euler="0 90 0"/>
+      </body>
+      <body name="boom" pos="0 2 0">
+        <joint/>
+        <geom type="capsule" size="0.2 0.4" euler="90 0 0"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def model() -> Any:
+    return mujoco.MjModel.from_xml_string(MODEL)
+
+
+@pytest.fixture(scope="module")
+def entities(model: Any) -> dict[str, Any]:
+    return {
+        entity.frame_id: entity for entity in SceneUpdate.FromString(scene(model).update).entities
+    }
+
+
+@pytest.fixture(scope="module")
+def robot(model: Any) -> Any:
+    return ElementTree.fromstring(scene(model).urdf)
+
+
+def xyz(message: Any) -> list[float]:
+    return [message.x, message.y, message.z]
+
+
+def color(message: Any) -> list[float]:
+    return [message.r, message.g, message.b, message.a]
+
+
+def test_each_body_is_a_frame_an_entity_and_a_link(
+    model: Any, entities: dict[str, Any], robot: Any
+) -> None:
+    assert scene(model).bodies == ("bus", "wheel_0", "boom")
+    assert set(entities) == {"world", "bus", "wheel_0", "boom"}
+    assert [link.get("name") for link in robot.findall("link")] == [
+        "world",
+        "bus",
+        "wheel_0",
+        "boom",
+    ]
+    # One tree: each body but the world is the child of exactly one joint, as it is on /tf.
+    joints = {
+        joint.find("child").get("link"): joint.find("parent").get("link")
+        for joint in robot.findall("joint")
+    }
+    assert joints == dict.fromkeys(scene(model).bodies, "world")
+    assert len(robot.findall("joint")) == 3
+    assert all(entity.frame_locked for entity in entities.values())
+
+
+def test_sizes_are_whole_and_what_is_hidden_is_left_out(entities: dict[str, Any]) -> None:
+    bus = entities["bus"]
+    ((box,), (lens,)) = bus.cubes, bus.spheres
+    assert (xyz(box.size), xyz(box.pose.position)) == ([2.0, 1.0, 0.5], [0.1, 0.2, 0.3])
+    assert xyz(lens.size) == [0.2, 0.4, 0.8]
+    (wheel,) = entities["wheel_0"].cylinders
+    assert (xyz(wheel.size), wheel.bottom_scale, wheel.top_scale) == ([1.0, 1.0, 0.2], 1.0, 1.0)
+    assert xyz(entities["world"].spheres[0].size) == [0.2, 0.2, 0.2]
+
+
+def test_colors_are_those_that_mujoco_draws(model: Any, entities: dict[str, Any]) -> None:
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    drawn = mujoco.MjvScene(model, maxgeom=100)
+    mujoco.mjv_updateScene(
+        model,
+        data,
+        mujoco.MjvOption(),
+        None,
+        mujoco.MjvCamera(),
+        mujoco.mjtCatBit.mjCAT_ALL.value,
+        drawn,
+    )
+    by_geom = {
+        g.objid: g.rgba.tolist()
+        for g in drawn.geoms[: drawn.ngeom]
+        if g.objtype == mujoco.mjtObj.mjOBJ_GEOM
+    }
+    ((box,), (lens,)) = entities["bus"].cubes, entities["bus"].spheres
+    assert color(box.color) == by_geom[model.geom("box").id] == [0.75, 0.5, 0.25, 1.0]
+    assert color(lens.color) == by_geom[model.geom("lens").id] == [0.0, 1.0, 0.0, 0.5]
+    assert model.geom("hull").id not in by_geom
+
+
+def test_a_capsule_has_round_ends_where_mujoco_has_them(entities: dict[str, Any]) -> None:
+    boom = entities["boom"]
+    (rod,) = boom.cylinders
+    assert xyz(rod.size) == [0.4, 0.4, 0.8]
+    ends = np.array([xyz(cap.pose.position) for cap in boom.spheres])
+    # z of the capsule is -y of the body; the tolerance is double rounding.
+    np.testing.assert_allclose(np.sort(ends[:, 1]), [-0.4, 0.4], atol=1e-15)
+    np.testing.assert_allclose(ends[:, [0, 2]], 0.0, atol=1e-15)
+
+
+def test_a_mesh_is_drawn_where_it_was_modelled(entities: dict[str, Any]) -> None:
+    (plate,) = entities["bus"].triangles
+    q, p = plate.pose.orientation, xyz(plate.pose.position)
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, np.array([q.w, q.x, q.y, q.z]))
+    points = np.array([xyz(point) for point in plate.points]) @ matrix.reshape(3, 3).T + p
+    vertices = 0.5 * np.array(TETRAHEDRON.split(), float).reshape(4, 3) + [1, 2, 3]
+    # The compiler moves vertices to the mesh's principal axes and stores them in single precision.
+    for vertex in vertices:
+        assert np.linalg.norm(points - vertex, axis=1).min() < 1e-6
+    corners = points[np.array(plate.indices).reshape(-1, 3)]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # Outward faces of a closed surface: their volume is positive, and the tetrahedron's.
+    volume = np.einsum("ij,ij", corners[:, 0] - points.mean(0), normals) / 6
+    np.testing.assert_allclose(volume, 0.5**3 / 6, rtol=1e-5)
+
+
+def visuals(robot: Any) -> Iterator[tuple[str, Any]]:
+    for link in robot.findall("link"):
+        for visual in link.findall("visual"):
+            yield link.get("name"), visual
+
+
+def test_urdf_has_the_same_shapes(robot: Any) -> None:
+    wanted: list[tuple[str, str, dict[str, Any]]] = [
+        ("world", "sphere", {"radius": 0.1}),
+        ("bus", "box", {"size": [2.0, 1.0, 0.5]}),
+        ("bus", "sphere", {"radius": 0.2}),  # the cube root of 0.1 0.2 0.4
+        ("wheel_0", "cylinder", {"radius": 0.5, "length": 0.2}),
+        ("boom", "cylinder", {"radius": 0.2, "length": 0.8}),
+        ("boom", "sphere", {"radius": 0.2}),
+        ("boom", "sphere", {"radius": 0.2}),
+    ]
+    for (link, visual), (body, kind, sizes) in zip(visuals(robot), wanted, strict=True):
+        (solid,) = visual.find("geometry")
+        assert (link, solid.tag, set(solid.attrib)) == (body, kind, set(sizes))
+        for key, size in sizes.items():
+            written = np.array(solid.get(key).split(), float)
+            np.testing.assert_allclose(written, size, rtol=1e-14)  # a cube root's roundings
+    materials = {visual.find("material").get("name") for _, visual in visuals(robot)}
+    assert len(materials) == len(wanted)
+
+
+def turned(axis: int, angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    plane = np.array([[c, -s], [s, c]])
+    matrix = np.eye(3)
+    others = [(1, 2), (2, 0), (0, 1)][axis]
+    matrix[np.ix_(others, others)] = plane
+    return matrix
+
+
+@given(st.tuples(*[st.sampled_from([-180, -90, -30, 0, 45, 90, 89.999999, 180])] * 3))
+def test_urdf_angles_are_the_geoms_orientation(angles: tuple[float, ...]) -> None:
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><body name="b"><joint/><geom size="1 1 1" type="box" '
+        f'euler="{" ".join(map(str, angles))}"/></body></worldbody></mujoco>'
+    )
+    ((_, visual),) = visuals(ElementTree.fromstring(scene(model).urdf))
+    roll, pitch, yaw = map(float, visual.find("origin").get("rpy").split())
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, model.geom_quat[0])
+    built = turned(2, yaw) @ turned(1, pitch) @ turned(0, roll)
+    # Near a pitch of 90 deg the arc tangents keep about half the digits of the angles, not of the
+    # rotation that they make up.
+    np.testing.assert_allclose(built, matrix.reshape(3, 3), atol=1e-14)
+
+
+def test_the_layout_shows_topics_of_the_log() -> None:
+    whole = json.loads(layout())
+    assert {panel.partition("!")[0] for panel in whole["configById"]} == {"3D", "Plot"}
+    paths = re.findall(r'"value": "(/\w+)\.(\w+)', layout().decode())
+    assert {("/truth", "attitude_error"), ("/truth", "rate"), ("/truth", "wheel_speed")} <= set(
+        paths
+    )
+    assert ("/command", "torque") in paths
+    assert {topic for topic, _ in paths} <= set(PERIODIC)
+    panels = re.findall(r"(?:3D|Plot)!\w+", json.dumps(whole["layout"]))
+    assert sorted(panels) == sorted(whole["configById"])

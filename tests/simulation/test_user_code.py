@@ -1,0 +1,355 @@
+"""Users' code can change nothing that it receives; what it returns and raises is named as that."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mjspace.simulation.assembly import assemble
+from mjspace.errors import FlightError, InputError
+from mjspace.runner.run import run
+from mjspace.scenario.loading import load
+from mjspace.simulation.loop import fly
+from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.recording import Block
+
+HEAD = """
+from typing import NamedTuple
+import numpy as np
+from mjspace.contract import Reference, TorqueCommand
+
+class Seen(NamedTuple):
+    e: np.ndarray
+
+class Law:
+    def __init__(self, batched=False):
+        self.batched = batched
+        self.memory = np.zeros((1, 3) if batched else 3)
+
+    def reset(self, m, r):
+        return None
+
+    def zero(self, m):
+        return TorqueCommand(np.zeros_like(m.rate))
+
+class Source:
+    def at(self, time):
+        n = len(time)
+        return Reference(np.tile([1.0, 0, 0, 0], (n, 1)), np.zeros((n, 3)), np.zeros((n, 3)))
+
+def push(time, truth):
+    return np.zeros(3), np.zeros(3)
+"""
+
+BASE = """
+description = "users' code"
+duration = "0.5 s"
+[rates]
+physics = "10 ms"
+control = "10 ms"
+[initial]
+rate = [0.1, -0.2, 0.3]
+[environment]
+python = "own.py:push"
+[reference]
+kind = "own.py:Source"
+[law]
+kind = "own.py:Law"
+[[checks]]
+name = "it turns"
+signal = "truth.rate"
+statistic = "min"
+above = 0.3
+"""
+
+
+def scenario(folder: Path, code: str) -> Path:
+    """Write a scenario whose law, reference and disturbance are HEAD with ``code`` after it."""
+    (folder / "own.py").write_text(HEAD + code)
+    (folder / "own.toml").write_text(BASE)
+    return folder / "own.toml"
+
+
+def flown(folder: Path, code: str, *overrides: str) -> list[Block]:
+    built = assemble(*load(scenario(folder, code), overrides))
+    return list(fly(built, first_start(built, [0])))
+
+
+def law(step: str, reset: str = "return None") -> str:
+    return f"""
+def step(self, s, t, m, r):
+    {step}
+def reset(self, m, r):
+    {reset}
+Law.step, Law.reset = step, reset
+"""
+
+
+GOOD = "return None, self.zero(m), Seen(m.rate)"
+
+
+@pytest.mark.parametrize("batched", ["true", "false"])
+@pytest.mark.parametrize(
+    "write",
+    [
+        "m.rate[...] = 0.0",
+        "m.attitude.__imul__(-1.0)",
+        "m.wheel_speed[...] = 0.0",
+        "r.attitude[...] = m.attitude",
+        "r.rate.__iadd__(1.0)",
+    ],
+)
+def test_a_law_cannot_write_into_what_it_receives(tmp_path: Path, write: str, batched: str) -> None:
+    with pytest.raises(FlightError, match=r"ValueError at own\.py:\d+: .*read-only.*copy it"):
+        flown(tmp_path, law(f"{write}; {GOOD}"), f"law.batched={batched}")
+
+
+@pytest.mark.parametrize("sensor", ["sensors.rate.noise=1e-3", "sensors.rate.delay='10 ms'"])
+def test_nor_into_what_a_sensor_that_is_not_ideal_reports(tmp_path: Path, sensor: str) -> None:
+    with pytest.raises(FlightError, match="read-only"):
+        flown(tmp_path, law(f"m.rate[...] = 0.0; {GOOD}"), sensor, "law.batched=true")
+
+
+@pytest.mark.parametrize("batched", ["true", "false"])
+def test_a_law_cannot_change_its_state_in_place(tmp_path: Path, batched: str) -> None:
+    code = law(
+        "s.e.__iadd__(1.0); return s, self.zero(m), None", "return Seen(np.zeros_like(m.rate))"
+    )
+    with pytest.raises(FlightError, match=r"own\.py:\d+: .*read-only"):
+        flown(tmp_path, code, f"law.batched={batched}")
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "Seen(self.memory[:]), self.zero(m), None",
+        "None, self.zero(m), Seen(self.memory)",
+        "None, TorqueCommand(self.memory), None",
+    ],
+)
+def test_nor_what_it_has_returned_before(tmp_path: Path, part: str) -> None:
+    code = law(
+        f"self.memory += 1e-9; return {part}",
+        "return Seen(self.memory[:])" if part.startswith("Seen") else "return None",
+    )
+    with pytest.raises(FlightError, match=r"own\.py:\d+: .*read-only"):
+        flown(tmp_path, code, "law.batched=true")
+
+
+def test_nor_what_its_inner_loop_receives(tmp_path: Path) -> None:
+    code = (
+        law(GOOD)
+        + """
+def inner(self, s, t, command, m):
+    m.rate[...] = 0.0
+    return s, command
+Law.inner = inner
+"""
+    )
+    with pytest.raises(
+        FlightError, match=r"inner loop raised ValueError at own\.py:\d+: .*read-only"
+    ):
+        flown(tmp_path, code, "law.batched=true", "rates.physics='5 ms'")
+
+
+@pytest.mark.parametrize("field", ["rate", "position", "magnetic_field", "orbit_position"])
+def test_a_disturbance_cannot_write_into_the_truth(tmp_path: Path, field: str) -> None:
+    code = (
+        law(GOOD)
+        + f"""
+def push(time, truth):
+    truth.{field}[...] = 0.0
+    return np.zeros(3), np.zeros(3)
+"""
+    )
+    orbit = (
+        "environment.orbit.semi_major_axis='6878 km'",
+        "environment.magnetic_field.model='dipole'",
+    )
+    with pytest.raises(
+        FlightError, match=r"the disturbance raised ValueError at own\.py:\d+: .*read-only"
+    ):
+        flown(tmp_path, code, *orbit)
+
+
+def test_a_reference_cannot_change_what_it_has_returned(tmp_path: Path) -> None:
+    code = (
+        law(GOOD)
+        + """
+class Source:
+    def __init__(self):
+        self.rows = np.zeros((1000, 3))
+    def at(self, time):
+        n = len(time)
+        self.rows += 1.0
+        return Reference(np.tile([1.0, 0, 0, 0], (n, 1)), self.rows[:n], np.zeros((n, 3)))
+"""
+    )
+    with pytest.raises(
+        FlightError, match=r"the reference raised ValueError at own\.py:\d+: .*read-only"
+    ):
+        flown(tmp_path, code, "duration=10")
+
+
+def test_a_copy_may_be_changed_and_the_truth_stays(tmp_path: Path) -> None:
+    code = law(
+        "rate = m.rate.copy(); rate -= 1.0; return None, TorqueCommand(0.0 * rate), Seen(rate)"
+    )
+    result = run(scenario(tmp_path, code), out=tmp_path / "out")
+    assert result.passed
+    rate = result.log.read("/truth", ["rate"])["rate"]
+    np.testing.assert_allclose(result.log.read("/law")["e"], rate - 1.0, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        ("return None", r"step returned None: it must return \(state, command, signals\)"),
+        ("return None, self.zero(m)", r"step returned \(None, a TorqueCommand\): it must return"),
+        ("return self.zero(m)", "step returned a TorqueCommand: it must return"),
+        ("return [None, self.zero(m), None]", "step returned a list: it must return"),
+        ("return None, np.zeros(3), None", r"array of shape \(3,\), None\): the command must be"),
+        ("return None, (np.zeros(3),), None", "the command must be a named tuple"),
+        ("return None, self.zero(m), {'e': 1.0}", r"TorqueCommand, a dict\): the signals must be"),
+        ("return {}, self.zero(m), None", "the state must be a named tuple"),
+        ("return None, self.zero(m), Seen('x')", "the law's signals.e is not an array of numbers"),
+        ("return None, self.zero(m), Seen(np.zeros(3 if t < 0.2 else 4))",
+         r"t = 0\.2 s: the law's signals\.e has the shape \(1, 4\) after \(1, 3\)"),
+        ("return (None, self.zero(m), None) if t < 0.2 else None", r"t = 0\.2 s: .*returned None"),
+        ("return None, self.zero(m), None if t < 0.2 else {'e': 1}", r"t = 0\.2 s: .* a dict\)"),
+        ("return None if t < 0.2 else Seen(1.0), self.zero(m), None",
+         r"t = 0\.2 s: the law's state has the fields \['e'\] after \[\]"),
+    ],
+)  # fmt: skip
+def test_a_wrong_return_is_named(tmp_path: Path, step: str, message: str) -> None:
+    with pytest.raises(FlightError, match=message):
+        flown(tmp_path, law(step))
+
+
+def test_periods_before_a_change_of_shape_are_kept(tmp_path: Path) -> None:
+    code = law("return None, self.zero(m), Seen(np.zeros(3 if t < 0.195 else 4))")
+    built = assemble(*load(scenario(tmp_path, code)))
+    kept: list[Block] = []
+    with pytest.raises(FlightError, match="has the shape"):
+        kept.extend(fly(built, first_start(built, [0])))
+    assert sum(map(len, (block.time for block in kept))) == 20
+
+
+@pytest.mark.parametrize("reset", ["return 1.0", "return np.zeros(3)", "return {}"])
+def test_a_wrong_first_state_is_named(tmp_path: Path, reset: str) -> None:
+    for batched in ("true", "false"):
+        with pytest.raises(FlightError, match=r"law's reset returned .*: it must return its"):
+            flown(tmp_path, law(GOOD, reset), f"law.batched={batched}")
+
+
+@pytest.mark.parametrize(
+    "later", ["None", "(None, self.zero(m))", "(None, self.zero(m), {'e': 1})", "(None, 1.0, None)"]
+)
+def test_a_batched_law_that_returns_something_else_later_is_named(
+    tmp_path: Path, later: str
+) -> None:
+    code = law(f"return (None, self.zero(m), None) if t < 0.2 else {later}")
+    with pytest.raises(FlightError, match=r"t = 0\.2 s: the law's step returned"):
+        flown(tmp_path, code, "law.batched=true")
+
+
+def test_a_batched_law_without_a_vehicle_axis_is_named(tmp_path: Path) -> None:
+    code = law("return None, self.zero(m), Seen(np.zeros(3))")
+    with pytest.raises(FlightError, match=r"signals\.e has the shape \(3,\): of a batched law"):
+        flown(tmp_path, code, "law.batched=true")
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("del Law.reset", r"law: own\.py:Law has no method reset\(measurement, reference\)"),
+        ("", r"law: own\.py:Law has no method step\(state, time,"),
+        (law(GOOD) + "del Source.at", r"reference: own\.py:Source has no method at\(time\)"),
+        (
+            law(GOOD) + "push = 3",
+            r"environment\.python: own\.py:push is not a function of \(time, truth\): int",
+        ),
+    ],
+)
+def test_what_lacks_a_method_is_refused_before_the_flight(
+    tmp_path: Path, code: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        assemble(*load(scenario(tmp_path, code)))
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        ("None", "the disturbance returned None: it must return a force"),
+        ("np.zeros(6)", "the disturbance returned"),
+        ("(np.zeros(3), np.zeros(2))", r"shapes \(3,\) and \(2,\)"),
+        ("(0.0, 1 / 0)", r"the disturbance raised ZeroDivisionError at own\.py:\d+"),
+    ],
+)
+def test_a_wrong_disturbance_is_named(tmp_path: Path, returned: str, message: str) -> None:
+    code = law(GOOD) + f"\ndef push(time, truth):\n    return {returned}\n"
+    with pytest.raises(FlightError, match=message):
+        flown(tmp_path, code)
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        ("np.zeros((n, 4))", r"returned an array of shape \(51, 4\): it must return a named tuple"),
+        ("TorqueCommand(np.zeros((n, 3)))", "the reference returned a TorqueCommand"),
+        ("Reference(np.zeros((3, 4)), np.zeros((n, 3)), np.zeros((n, 3)))",
+         r"the reference's attitude has the shape \(3, 4\) for 51 times"),
+    ],
+)  # fmt: skip
+def test_a_wrong_reference_is_named(tmp_path: Path, returned: str, message: str) -> None:
+    code = (
+        law(GOOD)
+        + f"""
+class Source:
+    def at(self, time):
+        n = len(time)
+        return {returned}
+"""
+    )
+    with pytest.raises(FlightError, match=message):
+        flown(tmp_path, code)
+
+
+def test_a_disturbance_knows_its_surroundings_whatever_the_sensors(tmp_path: Path) -> None:
+    """The field and the place in the orbit, against the logged magnetometer and Kepler's law."""
+    code = (
+        law(GOOD)
+        + """
+SEEN = []
+def push(time, truth):
+    SEEN.append((time, truth))
+    return np.zeros(3), np.zeros(3)
+"""
+    )
+    orbit = (
+        "environment.orbit={semi_major_axis='7000 km', eccentricity=0.01, inclination='60 deg'}",
+        "environment.magnetic_field.model='dipole'",
+        "rates.physics='5 ms'",
+    )
+    with_sensor = flown(tmp_path, code, *orbit, "sensors.magnetic_field={}")
+    from mjspace.scenario.construct import load_object
+
+    seen = load_object("own.py:SEEN", tmp_path)
+    field = with_sensor[0].rows["/truth"]["magnetic_field"][:, 0]
+    assert [time for time, _ in seen] == pytest.approx(0.005 * np.arange(101))
+    for (_, truth), expected in zip(seen[::2], field, strict=True):
+        np.testing.assert_array_equal(truth.magnetic_field, expected)
+    seen.clear()
+    flown(tmp_path, code, *orbit)
+    for (_, truth), expected in zip(seen[::2], field, strict=True):
+        np.testing.assert_array_equal(truth.magnetic_field, expected)
+    place, motion = (
+        np.array([getattr(truth, name) for _, truth in seen])
+        for name in ("orbit_position", "orbit_velocity")
+    )
+    # Vis-viva for a = 7000 km; and positions change as the velocities say (central differences
+    # of 10 ms: the jerk's share is n^2 h^2 / 6 = 2e-11).
+    radius, speed = (np.linalg.norm(rows, axis=1) for rows in (place, motion))
+    np.testing.assert_allclose(speed**2, 3.986004418e14 * (2 / radius - 1 / 7e6), rtol=1e-12)
+    np.testing.assert_allclose((place[2:] - place[:-2]) / 0.01, motion[1:-1], rtol=1e-6, atol=1e-5)
