@@ -15,11 +15,11 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.runner.run import fly_to_log
 from mjspace.scenario.loading import load
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 ROUNDS = 5
 

@@ -11,8 +11,8 @@ from statistics import median
 
 from closed_loop import bare_batch, bare_steps, flight, seconds
 
-from mjspace.simulation.assembly import assemble
 from mjspace.scenario.loading import load
+from mjspace.simulation.assembly import assemble
 
 ROUNDS = 15
 

@@ -15,14 +15,14 @@ import numpy as np
 from mjspace.controllers.cmg.dgvscmg import Cascade
 from mjspace.controllers.references.rate_references import Sinusoids
 
-from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.contract import Array, Measurement, Reference
 from mjspace.environment.install import userdata
 from mjspace.scenario.loading import load
-from mjspace.simulation.loop import fly
-from mjspace.simulation.initial_state import Start, first_start, last_period
 from mjspace.scenario.plant import Ripple
-from mjspace.simulation.recording import Columns
+from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.initial_state import Start, first_start, last_period
+from mjspace.simulation.loop import fly
+from mjspace.simulation.recording import StateLayout
 
 SCENARIO = "dgvscmg-low-momentum"  # for its limits and its wheel's motor
 SEED = 20260401
@@ -145,7 +145,7 @@ def dispersed(draw: Draw, vehicle: Assembly) -> tuple[Assembly, Start]:
     vehicle = replace(vehicle, law=Dispersed(law, wanted))
 
     start = first_start(vehicle, range(len(draw.motion)))
-    start.physics[:, Columns(vehicle).wheel_speed] = draw.wheel_speed[:, None]
+    start.physics[:, StateLayout(vehicle).wheel_speed] = draw.wheel_speed[:, None]
     for row, (amplitude, cycles, phase) in zip(start.physics, draw.vibration, strict=True):
         ripple = {"cmg_wheel": Ripple(amplitude=amplitude, cycles=cycles, phase=phase)}
         own = userdata(vehicle.vehicle.model, scenario.environment, {}, ripple)

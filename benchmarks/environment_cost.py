@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 
 from mjspace.environment import install
-from mjspace.vehicle import vehicle
 from mjspace.scenario.environment import DisturbanceTorque, Environment, Orbit, Sine
 from mjspace.scenario.plant import PlantTable, Rates
+from mjspace.vehicle import vehicle
 
 ORBIT = Orbit(semi_major_axis=7.0e6, eccentricity=0.01, inclination=0.9)
 TORQUE = DisturbanceTorque(

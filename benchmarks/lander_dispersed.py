@@ -10,15 +10,16 @@ import warnings
 
 import numpy as np
 
-from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.contract import Array
 from mjspace.scenario.loading import load
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start
+from mjspace.simulation.loop import fly
 from mjspace.terminal.terminal import progress_bar
 
 FIELDS = ("body_mass", "body_ipos", "body_inertia", "body_iquat")
-# Ten times as quick as RK4 at 2 ms, and lands alike (tests/simulation/test_lander_flight.py): 8 mm/s, 0.9 mm.
+# Ten times as quick as RK4 at 2 ms, and lands alike, to 8 mm/s and 0.9 mm
+# (tests/simulation/test_lander_flight.py).
 RATES = ["rates.physics='5 ms'", "rates.integrator=implicitfast"]
 LANDED = {"speed": 1.0, "tilt": np.radians(3.0)}  # m/s, rad
 

@@ -12,16 +12,15 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from mjspace.errors import InputError, print_warning
 from mjspace.rendering import graphics
-from mjspace.errors import InputError
 from mjspace.terminal.options import Json, LogFile, Out, Plot, Set, Traceback, Video
 from mjspace.terminal.terminal import (
     finish,
     in_full,
     open_log,
-    print_warning,
     progress_bar,
-    told_in_one_line,
+    report_errors,
 )
 from mjspace.validation.command import validate
 
@@ -37,7 +36,7 @@ app = typer.Typer(
 def main() -> None:
     """Run the command line; the entry point."""
     warnings.showwarning = print_warning
-    with told_in_one_line():
+    with report_errors():
         graphics.check()
         app()
 
@@ -96,9 +95,9 @@ def run(
     traceback: Traceback = False,
 ) -> None:
     """Fly a scenario, log it and judge it."""
-    from mjspace.simulation.assembly import assemble
     from mjspace.runner.run import fly_to_log, output_folder
     from mjspace.scenario.loading import load
+    from mjspace.simulation.assembly import assemble
 
     extra = [] if seed is None else [f"seed={seed}"]
     extra += [f"duration={duration}"] if duration else []
@@ -118,15 +117,15 @@ def run(
 
 
 def _run_all(overrides: list[str], out: Path, as_json: bool) -> NoReturn:
-    from mjspace.runner import run_all as every
+    from mjspace.runner import run_all
     from mjspace.scenario.loading import scenario_names
 
     with progress_bar(1.0, "flying", count="") as progress:
-        outcomes = every.fly(scenario_names(), overrides, out, progress)
+        outcomes = run_all.fly(scenario_names(), overrides, out, progress)
     if as_json:
-        print(json.dumps(every.data(outcomes), indent=2))
+        print(json.dumps(run_all.data(outcomes), indent=2))
     else:
-        every.show(outcomes)
+        run_all.show(outcomes)
         print(f"logs   {out}")
     raise typer.Exit(0 if all(outcome.result["passed"] for outcome in outcomes) else 1)
 
@@ -193,13 +192,13 @@ def render(
     at: Annotated[float | None, typer.Option(help="Time of a still [s]; else the end.")] = None,
 ) -> None:
     """Render a log to a video or a picture, offscreen."""
-    from mjspace.errors import blamed_on
+    from mjspace.errors import input_error_at
     from mjspace.rendering.render import render as to_picture
 
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit()):
         raise InputError(f"--size {size}: write width and height in pixels, as in 960x540")
-    with progress_bar(open_log(log).end, "rendering") as progress, blamed_on("render"):
+    with progress_bar(open_log(log).end, "rendering") as progress, input_error_at("render"):
         to_picture(
             log,
             output,
@@ -227,14 +226,14 @@ def plot(
     ] = None,
 ) -> None:
     """Plot a log to a PNG page."""
+    from mjspace.errors import InputError, input_error_at
     from mjspace.plotting import phase_plane
-    from mjspace.errors import InputError, blamed_on
     from mjspace.plotting.page import plot as to_picture
 
     if phase and signals:
         raise InputError("--phase: is a picture of its own: leave --signal out")
     open_log(log)
-    with blamed_on("plot"):
+    with input_error_at("plot"):
         if phase:
             phase_plane.plot(log, output, *phase)
         else:

@@ -10,6 +10,9 @@ from mjspace.ranges import Form, Range, refuse_unfit
 
 Array = NDArray[np.float64]
 
+TICK = 1e-9
+"""s: instants that are closer than this are one; it is what the stamps of a log can tell apart."""
+
 
 class Measurement(NamedTuple):
     """What the sensors report at a control instant; a leading vehicle axis may precede each shape.
@@ -117,8 +120,20 @@ class Trajectory(NamedTuple):
     """Inertial axes [m/s^2], shape (..., 3)."""
 
 
-Wanted = Reference | Trajectory
+DesiredMotion = Reference | Trajectory
 """What a law is told to follow."""
+
+
+class Event(NamedTuple):
+    """Something that happened in a flight, as the log has it on /events."""
+
+    time: float
+    """Simulation time [s]."""
+    vehicle: int
+    """Index in the batch; 0 in a log, which is of one vehicle."""
+    level: str
+    """``foxglove.Log``'s: DEBUG, INFO, WARNING, ERROR or FATAL."""
+    message: str
 
 
 class TorqueCommand(NamedTuple):
@@ -169,7 +184,7 @@ class Law(Protocol):
     arrays of one vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any
     command with that field; motors with an electrical side a ``VoltageCommand``; gimbals with speed
     loops a ``GimbalRateCommand``; an engine on gimbals a ``ThrustCommand``, on/off thrusters a
-    ``PulseCommand``. ``reference`` is what the scenario's reference says: ``Wanted``.
+    ``PulseCommand``. ``reference`` is what the scenario's reference says: ``DesiredMotion``.
 
     A batched law may have an inner loop as well, for what must be quick: a method
     ``inner(state, time, command, measurement) -> (state, command)``, pure like ``step``, that is
@@ -188,7 +203,7 @@ class Law(Protocol):
 class ReferenceSource(Protocol):
     """A wanted motion as a pure function of time."""
 
-    def at(self, time: Array) -> Wanted:
+    def at(self, time: Array) -> DesiredMotion:
         """Return the reference at each ``time`` [s], shape (n,), as arrays with n rows.
 
         Any named tuple would do that begins with the fields of ``Reference``: the law is given what

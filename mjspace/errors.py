@@ -1,7 +1,10 @@
 """Errors that are told in one line: bad input, a flight that cannot go on, no renderer."""
 
+import difflib
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 class InputError(ValueError):
@@ -17,7 +20,7 @@ class NoRendererError(RuntimeError):
 
 
 @contextmanager
-def blamed_on(key: str) -> Iterator[None]:
+def input_error_at(key: str) -> Iterator[None]:
     """Turn what a part or a file of the user's raises into an InputError that names ``key``."""
     try:
         yield
@@ -27,3 +30,15 @@ def blamed_on(key: str) -> Iterator[None]:
         message = str(error)
         named = message.startswith(key)
         raise InputError(message if named else f"{key}: {message}") from error
+
+
+def nearest(name: str, names: Any) -> str:
+    """Return ``": nearest is 'x' (have a, b, x)"`` for an error message."""
+    near = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
+    have = ", ".join(names) or "none"
+    return f": did you mean {near[0]!r}? (have {have})" if near else f": have {have}"
+
+
+def print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Show a warning as one line, in place of ``warnings.showwarning``."""
+    print(f"mjspace: warning: {message}", file=sys.stderr)

@@ -6,13 +6,12 @@ import inspect
 import math
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 from typing import Any, get_args
 
-import mjspace.controllers
 import numpy as np
 from pydantic import BaseModel
 
+from mjspace.scenario.construct import controllers
 from mjspace.scenario.loading import load, scenario_names
 from mjspace.scenario.scenario import Component, Scenario
 
@@ -43,14 +42,14 @@ FACTS: dict[str, Any] = {
 
 def kinds() -> Iterator[tuple[str, type]]:
     """Yield every law and reference that comes with mjspace, as a scenario names it."""
-    for path in sorted(Path(mjspace.controllers.__path__[0]).rglob("[a-z]*.py")):
-        module = importlib.import_module(f"mjspace.controllers.{path.stem}")
+    for short, full in sorted(controllers().items()):
+        module = importlib.import_module(full)
         for name, kind in vars(module).items():
             own = inspect.isclass(kind) and kind.__module__ == module.__name__
             flies = own and (hasattr(kind, "batched") or hasattr(kind, "at"))
             public = dataclasses.is_dataclass(kind) and not name.startswith("_")
             if flies and public and not inspect.isabstract(kind):
-                yield f"{path.stem}:{name}", kind
+                yield f"{short}:{name}", kind
 
 
 def gains_of(name: str, kind: type) -> dict[str, Any]:

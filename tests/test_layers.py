@@ -4,7 +4,6 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator
-from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -20,45 +19,43 @@ A_LAW_MAY_IMPORT = (
     *("abc", "collections", "dataclasses", "enum", "functools", "itertools", "math", "typing"),
     "warnings",
 )
-# These packages are known to no other module of the testbed.
-ONLY_IN = {
-    "mujoco": (
-        *(
-            "plant",
-            "addresses",
-            "composition",
-            "start",
-            "columns",
-            "ground_contact",
-            "environment",
-            "bearing_friction",
-            "struct_offsets",
-            "guards",
-            "stability",
-            "simulation",
-            "held_disturbance",
-            "tape",
-            "recorder",
-        ),
-        *(
-            "mujoco_log",
-            "stand",
-            "meter",
-            "passport",
-            "model_files",
-            "model_ties",
-            "conservation",
-            "convergence",
-            "plume",
-        ),
-        *("geometry", "offscreen", "render", "stage", "replay", "environments", "dm_bridge"),
+# The rooms of the testbed, from the ground up: what each may import, besides those that it names
+# here by a line above its own. A room is a package or a single module of mjspace.
+ROOMS = {
+    "constants": "",
+    "errors": "",
+    "ranges": "",
+    "units": "",
+    "scenarios": "",
+    "contract": "ranges",
+    "attitude": "contract",
+    "signals": "contract errors",
+    "scenario": "constants contract errors ranges units",
+    "vehicle": "contract errors scenario",
+    "environment": "constants contract scenario vehicle",
+    "sensors": "attitude contract scenario units",
+    "actuators": "constants contract environment errors scenario sensors signals units vehicle",
+    "log": "attitude contract scenario",
+    "plotting": "contract log scenario signals",
+    "rendering": "attitude contract environment errors log scenario vehicle",
+    "simulation": "actuators attitude contract environment errors scenario sensors signals vehicle",
+    "runner": "contract errors log scenario signals simulation vehicle",
+    "dm_env": "actuators attitude contract environment errors scenario simulation",
+    "terminal": "errors log plotting rendering runner",
+    "validation": (
+        "attitude constants contract environment errors log plotting runner scenario simulation "
+        "terminal vehicle"
     ),
-    "mcap": ("log_*",),
-    "dm_control": ("dm_bridge",),
-    "dm_env": ("environments",),
-    "mjspace.dm_env.bridge": ("environments",),
-    "mjspace.dm_env.environment": (),  # imported only when asked for
-    "mjspace.controllers": (),  # a scenario names its law, and the loader imports it
+    "cli": "errors plotting rendering runner scenario simulation terminal validation",
+    "__main__": "cli",
+}
+# Outside packages that a few rooms alone may know.
+ONLY_IN = {
+    "mujoco": "vehicle environment simulation log rendering dm_env runner validation",
+    "mcap": "log",
+    "dm_control": "dm_env",
+    "dm_env": "dm_env",
+    "mjspace.controllers": "",  # a scenario names its law, and the loader imports it
 }
 
 
@@ -81,10 +78,35 @@ def test_a_law_imports_only_what_flight_software_may(path: Path) -> None:
         assert any(within(name, package) for package in A_LAW_MAY_IMPORT), name
 
 
+def room_of(path: Path) -> str:
+    """Return the package or module of mjspace that the file belongs to."""
+    return path.relative_to(ROOT / "mjspace").parts[0].removesuffix(".py")
+
+
+def test_rooms_stand_in_order_each_on_those_above() -> None:
+    rooms = list(ROOMS)
+    for number, (room, may) in enumerate(ROOMS.items()):
+        assert set(may.split()) <= set(rooms[:number]), room
+    assert {room_of(path) for path in TESTBED} - {"__init__"} == set(rooms)
+    assert len(rooms) <= 26
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_imports_only_what_stands_beside_its_name(room: str) -> None:
+    used = set()
+    for path in TESTBED:
+        if room_of(path) == room:
+            for name in imported(path):
+                package, _, rest = name.partition(".")
+                if package == "mjspace":
+                    used.add(rest.partition(".")[0])
+    assert used - {room, "controllers", "__version__"} == set(ROOMS[room].split())
+
+
 @pytest.mark.parametrize("package", ONLY_IN)
-def test_only_the_named_modules_know(package: str) -> None:
-    users = {path.stem for path in TESTBED if any(within(n, package) for n in imported(path))}
-    assert not {user for user in users if not any(fnmatch(user, may) for may in ONLY_IN[package])}
+def test_only_the_named_rooms_know(package: str) -> None:
+    users = {room_of(path) for path in TESTBED if any(within(n, package) for n in imported(path))}
+    assert users <= set(ONLY_IN[package].split())
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
@@ -103,8 +125,17 @@ def test_no_module_hides_a_mapped_package() -> None:
         assert not (ROOT / "mjspace" / f"{name}.py").exists()
 
 
+def test_a_law_is_found_by_the_name_of_its_module_alone() -> None:
+    names = [law.stem for law in LAWS if law.stem != "__init__"]
+    assert len(names) == len(set(names))
+
+
 def test_laws_load_where_no_simulator_is() -> None:
     # Imports that the text of a law does not show, such as those of mjspace/__init__.py, count too.
-    laws = [f"mjspace.controllers.{law.stem}" for law in LAWS if law.stem != "__init__"]
+    laws = [
+        ".".join(["mjspace", *law.relative_to(ROOT).with_suffix("").parts])
+        for law in LAWS
+        if law.stem != "__init__"
+    ]
     code = "import sys; sys.modules.update(mujoco=None, mcap=None); import " + ", ".join(laws)
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -15,10 +15,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mjspace.contract import Array
-from mjspace.scenario.motors import Pmsm
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.plotting.style import COLORS, STYLE
+from mjspace.scenario.motors import Pmsm
 
 NAMES = ("CMG", "CMG, no vibration", "three wheels")
 PAGE = """# One double-gimbal CMG or three reaction wheels

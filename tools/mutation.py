@@ -43,7 +43,12 @@ import scipy.optimize
 import scipy.spatial.transform  # noqa: F401
 
 ROOT = Path(__file__).resolve().parents[1]
-LOG = ("test_log.py", "test_log_readers.py", "test_log_cut.py", "test_log_digest.py")
+LOG = (
+    "log/test_log.py",
+    "log/test_log_readers.py",
+    "log/test_log_cut.py",
+    "log/test_log_digest.py",
+)
 VALIDATION = ("validation/test_suite.py", "validation/test_report.py", "validation/test_command.py")
 GUARDS = {
     "mjspace/log/chunk.py": LOG,
@@ -54,22 +59,35 @@ GUARDS = {
     "mjspace/log/reader.py": LOG,
     "mjspace/log/schema.py": LOG,
     "mjspace/log/writer.py": LOG,
-    "mjspace/runner/recorder.py": ("test_recorder.py", "test_user_files.py"),
-    "mjspace/simulation/recording.py": ("test_tape.py", "test_blocks.py", "test_recorder.py", "test_crossings.py"),
-    "mjspace/runner/replay.py": ("test_replay.py", "test_api.py", "test_user_files.py"),
-    "mjspace/runner/checks.py": ("test_checks.py", "test_verdict.py"),
-    "mjspace/runner/run.py": ("test_verdict.py", "test_flight.py", "test_recorder.py"),
-    "mjspace/actuators/faults.py": ("test_faults.py", "test_blocks.py"),
-    "mjspace/sensors/noise.py": ("test_sensors.py",),
-    "mjspace/sensors/suite.py": ("test_sensors.py",),
-    "mjspace/sensors/accelerometer.py": ("test_strapdown.py",),
+    "mjspace/runner/recorder.py": ("runner/test_recorder.py", "scenario/test_user_files.py"),
+    "mjspace/simulation/recording.py": (
+        "simulation/test_recording.py",
+        "simulation/test_blocks.py",
+        "runner/test_recorder.py",
+        "simulation/test_events.py",
+    ),
+    "mjspace/runner/replay.py": (
+        "runner/test_replay.py",
+        "test_api.py",
+        "scenario/test_user_files.py",
+    ),
+    "mjspace/runner/checks.py": ("runner/test_checks.py", "runner/test_verdict.py"),
+    "mjspace/runner/run.py": (
+        "runner/test_verdict.py",
+        "runner/test_run.py",
+        "runner/test_recorder.py",
+    ),
+    "mjspace/actuators/faults.py": ("actuators/test_faults.py", "simulation/test_blocks.py"),
+    "mjspace/sensors/noise.py": ("sensors/test_sensors.py",),
+    "mjspace/sensors/suite.py": ("sensors/test_sensors.py",),
+    "mjspace/sensors/accelerometer.py": ("sensors/test_accelerometer.py",),
     "mjspace/validation/results.py": VALIDATION,
     "mjspace/validation/suite.py": VALIDATION,
     "mjspace/validation/table.py": VALIDATION,
     "mjspace/validation/meter.py": ("validation/test_stand.py", "validation/test_floating_arm.py"),
     "controllers/landing/guidance.py": (
-        "controllers/test_descent_plan.py",
-        "controllers/test_lander_guidance.py",
+        "controllers/landing/test_descent_plan.py",
+        "controllers/landing/test_lander_guidance.py",
     ),
 }
 """The modules that carry trust, each with the test files that guard it."""
@@ -421,7 +439,7 @@ def _imports(path: Path) -> Iterator[str]:
 
 def import_all() -> None:
     """Import what the tests will need, so that each fork has it."""
-    for path in sorted([*ROOT.glob("mjspace/**/*.py"), *ROOT.glob("controllers/*.py")]):
+    for path in sorted([*ROOT.glob("mjspace/**/*.py"), *ROOT.glob("controllers/**/*.py")]):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         if path.stem not in (
             "__init__",

@@ -13,6 +13,7 @@ from annotated_types import MaxLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from mjspace.scenario.construct import controllers
 from mjspace.scenario.fields import Si
 from mjspace.scenario.scenario import Scenario
 
@@ -57,15 +58,14 @@ def _laws() -> list[str]:
     """Return what may stand behind ``kind``, with its gains."""
     lines = ["## Laws and references that come with mjspace", ""]
     lines += ["| kind | gains (unit, range): default |", "|---|---|"]
-    package = import_module("mjspace.controllers")
-    for path in sorted(Path(package.__path__[0]).glob("[a-z]*.py")):
-        module = import_module(f"mjspace.controllers.{path.stem}")
+    for short, full in sorted(controllers().items()):
+        module = import_module(full)
         for name, kind in vars(module).items():
             flies = hasattr(kind, "batched") or hasattr(kind, "at")
             own = is_dataclass(kind) and kind.__module__ == module.__name__
             if own and flies and not isabstract(kind):
                 gains = [_gain(f) for f in fields(kind)]
-                lines.append(f"| `{path.stem}:{name}` | {', '.join(gains)} |")
+                lines.append(f"| `{short}:{name}` | {', '.join(gains)} |")
     closing = """
 A gain without a default must be given, but for `inertia`, `wheel_axes`, `wheel_inertia`,
 `control_period` and `inner_period` (the integration step): left out, they are those of the

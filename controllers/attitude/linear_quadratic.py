@@ -19,8 +19,8 @@ from scipy.linalg import solve_continuous_are
 
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
-from . import wheel_feedback_kernels as kernels
 from ..references.references import Regulation
+from . import wheel_feedback_kernels as kernels
 
 _TABLE_STEP = 0.1  # [s] between tabulated gains; 2e-9 of the largest, interpolated
 

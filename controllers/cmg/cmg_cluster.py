@@ -13,8 +13,8 @@ import numpy as np
 
 from mjspace.contract import Array, Gains, GimbalRateCommand, Measurement, Reference, gain
 
-from . import cmg_steering
 from ..attitude import pd_plus, pd_plus_kernels
+from . import cmg_steering
 
 
 class State(NamedTuple):

@@ -17,8 +17,8 @@ import numpy as np
 
 from mjspace.contract import Array, Gains, Measurement, Reference, VoltageCommand, gain
 
-from ..motors import motor_loops
 from ..attitude import pd_plus
+from ..motors import motor_loops
 from . import steering
 
 

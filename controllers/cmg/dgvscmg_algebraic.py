@@ -20,8 +20,8 @@ from numba import guvectorize
 
 from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
 
-from . import dgvscmg
 from ..motors import motor_loops
+from . import dgvscmg
 
 
 class State(NamedTuple):

@@ -14,8 +14,8 @@ import numpy as np
 
 from mjspace.contract import Array, Measurement, Reference, VoltageCommand, gain
 
-from . import dgvscmg
 from ..motors import sensorless
+from . import dgvscmg
 
 
 class State(NamedTuple):

@@ -10,9 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.contract import Array, Gains, Law, Measurement, Wanted, gain
-
-_TICK = 1e-9  # s
+from mjspace.contract import TICK, Array, DesiredMotion, Gains, Law, Measurement, gain
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Until(Gains):
 
     def holds(self, elapsed: Array, measurement: Measurement) -> Any:
         """Return whether it is met ``elapsed`` [s] (...) after the phase began, (...)."""
-        late = elapsed >= self.after - _TICK
+        late = elapsed >= self.after - TICK
         if not self.signal:
             return late
         name, part = self._parsed()
@@ -99,7 +97,7 @@ class Phases:
         """Whether all of the laws handle leading axes."""
         return all(getattr(phase.law, "batched", False) for phase in self.phases)
 
-    def reset(self, measurement: Measurement, reference: Wanted) -> Any:
+    def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
         """Return the state of the first phase; each law is stepped once, to see its arrays."""
         lead = measurement.rate.shape[:-1]
         states: list[Any] = []
@@ -121,7 +119,7 @@ class Phases:
         return _tuple("State", values, layout)(*values.values())
 
     def step(
-        self, state: Any, time: float, measurement: Measurement, reference: Wanted
+        self, state: Any, time: float, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
         """Return (state, command, signals) of the law whose phase it is at ``time`` [s]."""
         phase, began = state.phase[..., 0], state.began[..., 0]

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Gains, Reference, gain
+from mjspace.contract import TICK, Array, Gains, Reference, gain
 
 _SLOW = 0.05  # of the largest rate: what counts as rest at an end of the table
-_TICK = 1e-9  # s
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class Table(Gains):
         """
         inside = np.clip(time, self.time[0], self.time[-1])
         beyond = time - inside
-        if self.ends == "refuse" and (outside := np.abs(beyond) > _TICK).any():
+        if self.ends == "refuse" and (outside := np.abs(beyond) > TICK).any():
             raise ValueError(
                 f"time: the table has {self.time[0]:g} to {self.time[-1]:g} s, without "
                 f'{time[outside][0]:g} s: add rows, or set ends to "rest" or "continue"'

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjspace.contract import Array, gain
+from mjspace.contract import TICK, Array, gain
 
-from .relays import TICK, PhasePlane
+from .relays import PhasePlane
 
 
 @dataclass(frozen=True, kw_only=True)

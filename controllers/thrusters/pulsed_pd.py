@@ -16,8 +16,8 @@ import numpy as np
 from mjspace import attitude as att
 from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
 
-from .allocation import effect, pulses, share, within
 from ..attitude.turn_kernels import turn
+from .allocation import effect, pulses, share, within
 
 
 class State(NamedTuple):

@@ -15,11 +15,8 @@ import numpy as np
 from mjspace import attitude as att
 from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
 
-from .allocation import effect, pattern
 from ..attitude.turn_kernels import turn
-
-TICK = 1e-9
-"""s: what is left of a pulse that is over."""
+from .allocation import effect, pattern
 
 
 class State(NamedTuple):

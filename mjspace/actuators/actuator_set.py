@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from mjspace.actuators.base import Actuators, State
-from mjspace.vehicle.indices import is_thruster
+from mjspace.actuators.thrusters import Thrusters
 from mjspace.contract import Array, Measurement
 from mjspace.environment.kernel import MOMENT
 from mjspace.errors import FlightError
-from mjspace.actuators.thrusters import Thrusters
+from mjspace.vehicle.indices import is_thruster
 
 
 @dataclass(frozen=True)
-class Together:
+class ActuatorSet:
     """All that acts on a batch of vehicles; the fields of their states have different names."""
 
     kinds: tuple[Actuators, ...]
@@ -86,7 +86,7 @@ class Together:
         return {k.logged_as: np.array(c) for k, c in zip(self.kinds, columns, strict=True)}
 
 
-def weigh(batch: Any, masses: list[tuple[str, int, Array]]) -> None:
+def set_masses(batch: Any, masses: list[tuple[str, int, Array]]) -> None:
     """Give bodies the masses of the middle of the integration step.
 
     The constants that MuJoCo derives from them take 0.6 of a step's time: they are derived again

@@ -19,7 +19,8 @@ class Actuators(Protocol):
     Actuators that burn what they carry have a method ``masses(before, after)`` as well: for each
     field of MuJoCo's model that has changed, the body and the vehicles' values, (N, ...), in the
     middle of the integration step between these two states; and may have
-    ``billed(state, given, instead, step)``, which accounts for what faults make them give instead.
+    ``account_propellant(state, given, instead, step)``, which accounts for what is burnt where
+    faults make them give ``instead``.
     """
 
     logged_as: ClassVar[str]

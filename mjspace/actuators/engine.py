@@ -8,14 +8,12 @@ from numba import guvectorize
 
 from mjspace.actuators.base import Fields, State
 from mjspace.constants import STANDARD_GRAVITY
-from mjspace.contract import Array, Measurement
+from mjspace.contract import TICK, Array, Measurement
 from mjspace.scenario.landing import Engine
 from mjspace.vehicle.vehicle import Vehicle
 
 DRY = 1e-6
 """kg left in a tank that is empty: a body with none would have no inertia."""
-TICK = 1e-9
-"""s: the clock's sum of steps may round."""
 FIELDS = ("thrust", "propellant", "burning", "clock")
 
 

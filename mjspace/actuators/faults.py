@@ -7,19 +7,17 @@ from typing import Any
 import numpy as np
 
 from mjspace.actuators.base import Actuators, State
-from mjspace.vehicle.indices import is_thruster
-from mjspace.runner.checks import find_signal, magnitude
-from mjspace.scenario.construct import nearest
-from mjspace.contract import Array
-from mjspace.errors import blamed_on
+from mjspace.actuators.thrusters import Thrusters
+from mjspace.contract import TICK, Array, Event
+from mjspace.errors import input_error_at, nearest
 from mjspace.scenario.faults import Fault
 from mjspace.sensors.noise import normals
+from mjspace.signals import find_signal, magnitude
 from mjspace.units import whole_number
-from mjspace.actuators.thrusters import Thrusters
+from mjspace.vehicle.indices import is_thruster
 
 STREAM = 1000
 """First number of the faults' random streams; the sensors' are the fields of ``Measurement``."""
-TICK = 1e-9  # s
 _WAITING, _IN_FORCE, _OVER = 0.0, 1.0, 2.0
 
 
@@ -94,7 +92,7 @@ class FaultSet:
 
     def decide(
         self, state: State, now: float, seen: Mapping[str, Any] | None
-    ) -> tuple[State, list[tuple[float, int, str, str]]]:
+    ) -> tuple[State, list[Event]]:
         """Return the state with what begins and ends at ``now`` [s], and the events of that.
 
         ``seen`` has the named tuples that a fault's ``when`` may look at, by topic; None between
@@ -112,8 +110,10 @@ class FaultSet:
             begins &= self._is_due(number, now, seen)
             phase[ends, number], phase[begins, number] = _OVER, _IN_FORCE
             what = f"fault: {fault.motor} is {fault.kind}"
-            happened += [(now, int(v), "WARNING", what) for v in np.flatnonzero(begins)]
-            happened += [(now, int(v), "INFO", f"{what} no more") for v in np.flatnonzero(ends)]
+            happened += [Event(now, int(v), "WARNING", what) for v in np.flatnonzero(begins)]
+            happened += [
+                Event(now, int(v), "INFO", f"{what} no more") for v in np.flatnonzero(ends)
+            ]
         return state | {"fault_phase": phase}, happened
 
     def change(
@@ -136,8 +136,8 @@ class FaultSet:
             changed[:, place.columns] = np.where(in_force[:, None], wrong, right)
             result[place.kind] = changed
         for number, kind in enumerate(self._kinds):
-            if hasattr(kind, "billed"):
-                state, result[number] = kind.billed(
+            if hasattr(kind, "account_propellant"):
+                state, result[number] = kind.account_propellant(
                     state, given[number], result[number], self._hold
                 )
         return state, tuple(result)
@@ -163,7 +163,7 @@ class FaultSet:
             if values
         }
         topics = {t: {n: a.shape[1:] for n, a in fields.items()} for t, fields in arrays.items()}
-        with blamed_on(f"faults.{number}.when.signal"):
+        with input_error_at(f"faults.{number}.when.signal"):
             topic, field, part = find_signal(topics, fault.when.signal)
         rows = arrays[topic][field].reshape(self._vehicles, -1)
         return fault.when.admits(magnitude(rows[:, part]))

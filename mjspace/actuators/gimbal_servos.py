@@ -8,8 +8,8 @@ from numba import guvectorize
 
 from mjspace.actuators.base import Fields, State
 from mjspace.contract import Array, Measurement
-from mjspace.vehicle.vehicle import Vehicle
 from mjspace.scenario.servos import Servos
+from mjspace.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True)

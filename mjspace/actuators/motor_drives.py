@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mjspace.actuators.base import Fields, State
+from mjspace.actuators.pmsm import Drives
 from mjspace.contract import Array, Measurement
 from mjspace.scenario.motors import Pmsm
 from mjspace.vehicle.vehicle import Vehicle
-from mjspace.actuators.pmsm import Drives
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Literal, Self
 import numba
 import numpy as np
 
-from mjspace.vehicle import model_checks, stability
 from mjspace.actuators.base import Fields, State
 from mjspace.contract import Array, Measurement
+from mjspace.vehicle import model_checks, stability
 from mjspace.vehicle.vehicle import Vehicle
 
 MISSED = 1e-9, 1e-12

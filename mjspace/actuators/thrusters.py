@@ -8,15 +8,15 @@ import numpy as np
 from numba import guvectorize
 
 from mjspace.actuators.base import Fields, State
+from mjspace.actuators.engine import DRY
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
-from mjspace.actuators.engine import DRY
-from mjspace.vehicle.vehicle import Vehicle
-from mjspace.scenario.thrusters import Rcs
 from mjspace.scenario.plant import Rates
+from mjspace.scenario.thrusters import Rcs
+from mjspace.vehicle.vehicle import Vehicle
 
 FIELDS = ("rcs_thrust", "rcs_open", "rcs_on_time", "rcs_asked", "rcs_step", "rcs_propellant")
-TICK = 1e-12
+_ROUNDING = 1e-12
 """s: pulses that are closer than this are one."""
 
 
@@ -107,7 +107,7 @@ class Thrusters:
         left = np.concatenate([truth.propellant, state["rcs_propellant"]], axis=-1)
         return truth._replace(thrust=thrust, propellant=left)
 
-    def billed(
+    def account_propellant(
         self, state: State, given: Array, instead: Array, step: float
     ) -> tuple[State, Array]:
         """Return (state, thrust) where faults have made ``instead`` of what ``act`` gave, (N, n).
@@ -173,24 +173,24 @@ def _pulse(
         if count[0] == 0.0:
             asked_after[i, 1:] = asked[i, :-1]
             asked_after[i, 0] = min(max(command[i], 0.0), period)
-        short = 0.0 < command[i] < least - TICK
-        beyond = command[i] < 0.0 or command[i] > period + TICK
+        short = 0.0 < command[i] < least - _ROUNDING
+        beyond = command[i] < 0.0 or command[i] > period + _ROUNDING
         cut[i] = 1.0 if short or beyond or (dry and command[i] > 0.0) else 0.0
 
         now, impulse, open_for, on = 0.0, 0.0, opened[i], on_time[i]
         flowing = 0.0 if dry else thrust[i]
-        while now < step - TICK:
+        while now < step - _ROUNDING:
             # Until when the valve is as it is at `now`.
             wanted, until = False, step
             for k in range(asked.shape[1]):
                 start = delay - elapsed - k * period
                 stop = start + asked_after[i, k]
-                if start - TICK <= now < stop - TICK:
+                if start - _ROUNDING <= now < stop - _ROUNDING:
                     wanted = True
                     until = min(until, stop)
-                elif start > now + TICK and asked_after[i, k] > TICK:
+                elif start > now + _ROUNDING and asked_after[i, k] > _ROUNDING:
                     until = min(until, start)
-            held = not wanted and 0.0 < open_for < least - TICK
+            held = not wanted and 0.0 < open_for < least - _ROUNDING
             if held:
                 until = min(until, now + least - open_for)
             span = until - now

@@ -16,18 +16,18 @@ import numpy as np
 from dm_env.specs import BoundedArray
 
 from mjspace import attitude
+from mjspace.actuators.reaction_wheels import ReactionWheels
+from mjspace.contract import Array, DesiredMotion, Measurement
 from mjspace.dm_env import bridge
 from mjspace.environment import install
+from mjspace.errors import InputError
 from mjspace.scenario import loading
 from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.simulation.state_layout import Columns
-from mjspace.contract import Array, Measurement, Wanted
-from mjspace.errors import InputError
-from mjspace.simulation.user_disturbance import HeldDisturbance
-from mjspace.actuators.reaction_wheels import ReactionWheels
-from mjspace.simulation.loop import BLOCK_PERIODS
 from mjspace.simulation.initial_state import INTEGRATION, first_start, last_period
+from mjspace.simulation.loop import BLOCK_PERIODS
+from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_code import reference_at
+from mjspace.simulation.user_disturbance import HeldDisturbance
 
 TOLERATED_ERROR = np.radians(1.0)
 """Attitude error [rad] that earns the full reward where no check of the scenario bounds it."""
@@ -47,9 +47,7 @@ def load(scenario: str | Path, overrides: Iterable[str] = ()) -> Any:
     """
     loaded, folder = loading.load(scenario, overrides)
     assembly = assemble(loaded, folder)
-    return bridge.Environment(
-        Physics(assembly), Tracking(assembly), n_sub_steps=loaded.rates.steps
-    )
+    return bridge.Environment(Physics(assembly), Tracking(assembly), n_sub_steps=loaded.rates.steps)
 
 
 class Physics(bridge.Physics):  # type: ignore[misc]
@@ -62,7 +60,7 @@ class Physics(bridge.Physics):  # type: ignore[misc]
     """
 
     def __init__(self, assembly: Assembly) -> None:
-        self._columns = Columns(assembly)
+        self._columns = StateLayout(assembly)
         self._assembly = assembly
         self._momentum = assembly.vehicle.momentum
         self._rates = assembly.scenario.rates
@@ -161,7 +159,7 @@ class Tracking(bridge.Task):  # type: ignore[misc]
         ]
 
         @lru_cache(maxsize=1)
-        def block(number: int) -> Wanted:
+        def block(number: int) -> DesiredMotion:
             first = number * BLOCK_PERIODS
             end = min(first + BLOCK_PERIODS, self._last + 1)
             times = np.arange(first, end, dtype=np.float64) * self._control
@@ -222,7 +220,7 @@ class Tracking(bridge.Task):  # type: ignore[misc]
             return 0.0
         return 1.0 if physics.period() >= self._last else None
 
-    def _reference(self, physics: Physics) -> Wanted:
+    def _reference(self, physics: Physics) -> DesiredMotion:
         number, row = divmod(physics.period(), BLOCK_PERIODS)
         block = self._block(number)
         return type(block)(*(values[row] for values in block))

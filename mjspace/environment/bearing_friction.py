@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.vehicle.model_checks import ModelWarning
 from mjspace.scenario.hinges import Friction
+from mjspace.vehicle.model_checks import ModelWarning
 from mjspace.vehicle.stability import mass_matrix
 
 SPEED = 0.1

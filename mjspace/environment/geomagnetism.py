@@ -12,8 +12,8 @@ from pyIGRF14.calculate import igrf12syn as synthesis  # of the 14th generation,
 from pyIGRF14.loadCoeffs import get_coeffs
 from scipy.interpolate import CubicSpline
 
-from mjspace.environment import kepler, dipole
 from mjspace.contract import Array
+from mjspace.environment import dipole, kepler
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.magnetics import MagneticField
 from mjspace.scenario.plant import Rates
@@ -108,9 +108,7 @@ def field_at(table: MagneticField, place: Array, time: Array) -> Array:
         longitude = earth.longitude + turned
         rotation = dipole.EARTH_ROTATION
         poles = [dipole.northern_pole(t, tilt, longitude, rotation) for t in time]
-        rows = [
-            dipole.dipole(*both, earth.strength) for both in zip(place, poles, strict=True)
-        ]
+        rows = [dipole.dipole(*both, earth.strength) for both in zip(place, poles, strict=True)]
         return np.array(rows)
     radius = np.sqrt(np.sum(place**2, axis=-1))
     latitude = np.arcsin(place[:, 2] / radius)

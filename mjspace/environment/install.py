@@ -12,9 +12,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mjspace.environment import bearing_friction, central_gravity, kepler, struct_offsets
-from mjspace.environment import kernel
 from mjspace.contract import Array
+from mjspace.environment import bearing_friction, central_gravity, kepler, kernel, struct_offsets
 from mjspace.scenario.environment import DisturbanceTorque, Environment, Orbit
 from mjspace.scenario.hinges import Friction
 from mjspace.scenario.plant import Ripple

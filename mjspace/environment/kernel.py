@@ -19,9 +19,9 @@ from numba import cfunc, njit, types
 from numba.np.numpy_support import carray
 
 from mjspace.environment import kepler
-from mjspace.environment.torques import body_torque, friction, inertial_torque, magnetic, ripple
 from mjspace.environment.native_memory import floats, ints
 from mjspace.environment.struct_offsets import DataOffsets, ModelOffsets
+from mjspace.environment.torques import body_torque, friction, inertial_torque, magnetic, ripple
 
 MAGIC = 6.02214076e23
 HEADER = 4

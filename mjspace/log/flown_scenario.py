@@ -2,8 +2,8 @@
 
 import tomllib
 
-from mjspace.scenario.loading import validate
 from mjspace.log.reader import Log
+from mjspace.scenario.loading import validate
 from mjspace.scenario.scenario import Scenario
 
 

@@ -5,27 +5,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.Log_pb2 import Log as LogMessage
 from numpy.typing import NDArray
 
-from mjspace.contract import Array
+from mjspace.contract import Array, Event
 from mjspace.log.digest import RowDigests
-from mjspace.log.index import ChunkPlace, inventory, read_attachment, read_messages
 from mjspace.log.encoding import HEADER, doubles
+from mjspace.log.index import ChunkPlace, inventory, read_attachment, read_messages
 from mjspace.log.schema import PERIODIC, field_names
-
-
-class Event(NamedTuple):
-    """An entry of /events."""
-
-    time: float
-    """Simulation time [s]."""
-    level: str
-    """``foxglove.Log``'s: DEBUG, INFO, WARNING, ERROR or FATAL."""
-    message: str
 
 
 class Log:
@@ -177,7 +167,7 @@ class Log:
         for record in chain.from_iterable(self._records("/events", self._found.chunks)):
             entry = LogMessage.FromString(record[HEADER.itemsize :])
             time = entry.timestamp.ToNanoseconds() / 1e9
-            events.append(Event(time, LogMessage.Level.Name(entry.level), entry.message))
+            events.append(Event(time, 0, LogMessage.Level.Name(entry.level), entry.message))
         return events
 
     @cached_property

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from mjspace.contract import Array
 from mjspace.log.chunk import Nanoseconds, Part, block, message
 from mjspace.log.digest import RECORD, RowDigests
-from mjspace.log.file import LogFile
 from mjspace.log.encoding import Fields, doubles, side_by_side, transforms, varint5
+from mjspace.log.file import LogFile
 from mjspace.log.schema import Scene, channels
 
 

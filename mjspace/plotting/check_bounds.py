@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from mjspace.runner.checks import find_signal
 from mjspace.log.reader import Log
 from mjspace.plotting.panels import Panel
 from mjspace.scenario.scenario import Check
+from mjspace.signals import find_signal
 
 _NARROW = 0.3  # of the upper bound
 _SHORTEST = 0.05  # of the log: a bound on one instant, drawn so that it is seen

@@ -11,9 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.plotting.panels import Curves, chosen, curves
 from mjspace.plotting.style import COLORS, FAINT, INK, STYLE
 from mjspace.scenario.scenario import Scenario

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjspace.runner.checks import find_signal
 from mjspace.contract import Array
 from mjspace.log.reader import Log
 from mjspace.plotting.decimate import outline
+from mjspace.signals import find_signal
 
 DEGREES = float(np.degrees(1.0))
 RPM = 30.0 / np.pi

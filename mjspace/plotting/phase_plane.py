@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from mjspace.runner.checks import find_signal
 from mjspace.contract import Array
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.plotting.panels import DEGREES
 from mjspace.plotting.style import COLORS, FAINT, INK, STYLE
+from mjspace.signals import find_signal
 
 WIDTH, HEIGHT = 7.5, 6.0  # inches
 GROUPS = 6

@@ -8,8 +8,8 @@ from typing import Any, Self
 import mujoco
 import numpy as np
 
-from mjspace.rendering import graphics
 from mjspace.errors import NoRendererError
+from mjspace.rendering import graphics
 from mjspace.rendering.video import Frame
 
 _INSTALL = "install Mesa's EGL (Debian and Ubuntu: apt-get install libegl1 libgl1)"

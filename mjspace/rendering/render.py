@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from mjspace.rendering import overlay
 from mjspace.contract import Array
 from mjspace.log.flown_scenario import scenario_of
-from mjspace.scenario.landing import Engine
 from mjspace.log.reader import Log
+from mjspace.rendering import overlay
 from mjspace.rendering.offscreen import Canvas
-from mjspace.vehicle.vehicle import from_bytes
 from mjspace.rendering.scene import Stage
 from mjspace.rendering.video import Frame, Video
+from mjspace.scenario.landing import Engine
+from mjspace.vehicle.vehicle import from_bytes
 
 
 def render(

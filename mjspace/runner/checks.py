@@ -1,29 +1,22 @@
 """Judging a flight: each check is a statistic of one logged signal over a window of time."""
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from mjspace.scenario.construct import nearest
-from mjspace.contract import Array
-from mjspace.errors import InputError, blamed_on
+from mjspace.contract import TICK, Array
+from mjspace.errors import InputError, input_error_at
 from mjspace.log.reader import Log
-from mjspace.scenario.scenario import Check, Event
-
-Topics = Mapping[str, Mapping[str, tuple[int, ...]]]
-"""The shape of each field of each topic."""
+from mjspace.scenario.scenario import Check, EventTable
+from mjspace.signals import Topics, find_signal, magnitude
 
 Outcome = Literal["PASS", "FAIL", "not measured"]
 
 NO_CRASH = Check(name="no crash", signal="truth.crash", statistic="max", below=0.5)
 """What a vehicle over a ground is checked for, unless the scenario itself looks at that signal."""
-
-TICK = 1e-9
-"""s: what the log's stamps can tell apart."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +70,7 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
         InputError: the first of them, with the near names.
     """
     for number, check in enumerate(checks):
-        with blamed_on(f"checks.{number}.signal"):
+        with input_error_at(f"checks.{number}.signal"):
             _, _, part = find_signal(topics, check.signal)
         size = part.stop - part.start
         count = 1 if check.target is None else np.size(check.target)
@@ -85,7 +78,7 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
             raise InputError(f"checks.{number}.target: {count} numbers, {check.signal} has {size}")
 
 
-def judge(log: Log, checks: Sequence[Check], events: Sequence[Event] = ()) -> list[Verdict]:
+def judge(log: Log, checks: Sequence[Check], events: Sequence[EventTable] = ()) -> list[Verdict]:
     """Return the verdict of each check, from the log alone, one chunk of it in memory at a time.
 
     A vehicle over a ground is checked for ``NO_CRASH`` as well.
@@ -104,38 +97,7 @@ def judge(log: Log, checks: Sequence[Check], events: Sequence[Event] = ()) -> li
     return [_verdict(log, check, happened) for check in checks]
 
 
-def find_signal(topics: Topics, signal: str) -> tuple[str, str, slice]:
-    """Return the topic, field and components that ``signal`` names.
-
-    ``truth.rate`` is all of it, ``truth.rate[0]`` one component, ``truth.rate[0:2]`` the first two.
-
-    Raises:
-        ValueError: there is none, with the near names.
-    """
-    match = re.fullmatch(r"/?(\w+)\.(\w+)(?:\[(\d+)(?::(\d+))?\])?", signal)
-    if match is None:
-        raise ValueError(
-            f"signal {signal!r}: write topic.field, topic.field[i] or topic.field[i:j]"
-        )
-    topic, field = "/" + match[1], match[2]
-    names = [f"{name[1:]}.{f}" for name, fields in topics.items() for f in fields]
-    if field not in topics.get(topic, {}):
-        raise ValueError(f"no signal {signal!r} in the log{nearest(f'{match[1]}.{field}', names)}")
-    size = int(np.prod(topics[topic][field]))
-    start = int(match[3] or 0)
-    end = int(match[4]) if match[4] else start + 1 if match[3] else size
-    if not start < end <= size:
-        raise ValueError(f"signal {signal!r}: {topic[1:]}.{field} has {size} components")
-    return topic, field, slice(start, end)
-
-
-def magnitude(rows: Array) -> Array:
-    """Return a signal's values (...) from its ``rows`` (..., k): of a vector its norm."""
-    values: Array = rows[..., 0] if rows.shape[-1] == 1 else np.linalg.norm(rows, axis=-1)
-    return values
-
-
-def _first(log: Log, event: Event) -> float:
+def _first(log: Log, event: EventTable) -> float:
     """Return when the event's signal is in its region first [s]; nan if never."""
     topic, field, part = find_signal(log.topics, event.signal)
     for block in log.blocks(topic, [field], start=None, end=None):

@@ -8,12 +8,12 @@ import mujoco
 import numpy as np
 
 from mjspace.log import foxglove_layout, provenance
-from mjspace.vehicle import vehicle
-from mjspace.simulation.assembly import Assembly
 from mjspace.log.scene import scene
-from mjspace.scenario.loading import to_toml
 from mjspace.log.writer import LogWriter
+from mjspace.scenario.loading import to_toml
+from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.recording import Block, one_vehicle, shapes
+from mjspace.vehicle import vehicle
 
 FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
 

@@ -2,29 +2,27 @@
 
 import dataclasses
 import math
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from mjspace.vehicle import vehicle
-from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.contract import Measurement
-from mjspace.errors import InputError, blamed_on
-from mjspace.runner.run import Progress, Result, fly_to_log
+from mjspace.errors import InputError, input_error_at
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.scenario import Component, Scenario
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start
+from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block, Rows, one_vehicle, shapes
 from mjspace.simulation.user_code import reference_at
+from mjspace.vehicle import vehicle
 
 SOURCES = ("law", "reference", "disturbance")
 
@@ -66,7 +64,7 @@ def replay(
         InputError: no such log, time or law.
         OSError: the new log cannot be written.
     """
-    with blamed_on("log"):
+    with input_error_at("log"):
         log = Log(log_path)
     path = Path(out) / "flight.mcap"
     if path.exists() and path.samefile(log_path):
@@ -88,7 +86,7 @@ def verify(
         InputError: no such log or time, or rows that the log's own digests do not know.
         FlightError: the repeated flight cannot go on where the logged one could.
     """
-    with blamed_on("log"):
+    with input_error_at("log"):
         log = Log(log_path)
         altered = log.altered()
     if altered:
@@ -124,7 +122,7 @@ def assembly_of(
         InputError: the log lacks one of them, the law cannot be built, or another version packed
             the environment into the state differently.
     """
-    with blamed_on("log"):
+    with input_error_at("log"):
         scenario = scenario_of(log)
     if law is not None:
         scenario = _without_signals_of_the_law(scenario).model_copy(update={"law": law})
@@ -230,16 +228,3 @@ def first_difference(logged: Rows, flown: Rows) -> Difference | None:
                 k, i = map(int, places[0])
                 found = Difference(float(time[k]), topic, name, i, float(a[k, i]), float(b[k, i]))
     return found
-
-
-class _Callable(ModuleType):
-    """This module, once imported, is what ``mjspace.replay`` names: it flies as the function does.
-
-    A package's attribute is the submodule of that name, whatever the package defines itself.
-    """
-
-    def __call__(self, *arguments: Any, **options: Any) -> Result:
-        return replay(*arguments, **options)
-
-
-sys.modules[__name__].__class__ = _Callable

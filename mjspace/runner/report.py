@@ -6,9 +6,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from mjspace.log.reader import Log
 from mjspace.runner.checks import Verdict
 from mjspace.runner.run import Result
-from mjspace.log.reader import Log
 
 
 def print_result(result: Result) -> None:
@@ -87,7 +87,7 @@ def log_data(log: Log) -> dict[str, Any]:
         "attachments": sorted(log.attachments),
         "events": [
             {"time": time, "level": level, "message": message}
-            for time, level, message in log.events()
+            for time, _, level, message in log.events()
         ],
     }
 
@@ -109,7 +109,7 @@ def print_log(log: Log) -> None:
         changed = f"[bold red]{', '.join(altered)} changed since the flight[/]"
         table.add_row("digests", changed if altered else "every topic as it was written")
     console.print(table)
-    for time, level, message in log.events():
+    for time, _, level, message in log.events():
         console.print(
             f"{time:12.6f} s  {level:7}  {message}", highlight=False, markup=False, soft_wrap=True
         )

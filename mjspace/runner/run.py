@@ -6,15 +6,15 @@ from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
 
-from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.runner.checks import Verdict, judge, refuse_unknown
 from mjspace.errors import FlightError
-from mjspace.scenario.loading import load
 from mjspace.log.reader import Log
-from mjspace.runner.recorder import Recorder
-from mjspace.simulation.loop import fly
-from mjspace.simulation.initial_state import Start, first_start
+from mjspace.runner.checks import Verdict, judge, refuse_unknown
 from mjspace.runner.interrupts import on_signals
+from mjspace.runner.recorder import Recorder
+from mjspace.scenario.loading import load
+from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.initial_state import Start, first_start
+from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import shapes
 
 Progress = Callable[[float], None]

@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from mjspace.runner import run, report, workers
+from mjspace.runner import report, run, workers
 from mjspace.runner.run import Progress
 from mjspace.scenario.loading import load
 

@@ -7,6 +7,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import forkserver, get_all_start_methods, get_context
 from typing import Any, TypeVar
 
+from mjspace.errors import print_warning
+
 # Callbacks are global, so that every flight needs a process; threads do not survive a plain fork.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
 _CONTEXT = get_context(_METHOD)
@@ -37,8 +39,7 @@ def each(
 
 
 def _quiet() -> None:
-    from mjspace.simulation import mujoco_warnings
-    from mjspace.terminal import terminal  # here: this module must not cost what it saves
+    from mjspace.simulation import mujoco_warnings  # here: this module must not cost what it saves
 
     mujoco_warnings.silence()
-    warnings.showwarning = terminal.print_warning
+    warnings.showwarning = print_warning

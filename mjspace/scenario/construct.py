@@ -1,9 +1,10 @@
 """From a name and a table of gains to a law or a reference: find the class, check, construct."""
 
 import dataclasses
-import difflib
+import functools
 import importlib
 import inspect
+import pkgutil
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -11,11 +12,12 @@ from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
-from mjspace.scenario.gain_tables import columns
-from mjspace.units import quantity_in, to_si
+from mjspace.errors import nearest
 from mjspace.ranges import numbers, refuse_unfit
+from mjspace.scenario.gain_tables import columns
 from mjspace.scenario.scenario import Component
 from mjspace.scenario.user_files import load_file
+from mjspace.units import quantity_in, to_si
 
 
 def load_object(kind: str, folder: Path) -> Any:
@@ -117,13 +119,6 @@ def _within(key: str, value: Any, facts: Mapping[str, Any], folder: Path) -> tup
     return built, {"kind": flown.kind, **flown.gains}
 
 
-def nearest(name: str, names: Any) -> str:
-    """Return ``": nearest is 'x' (have a, b, x)"`` for an error message."""
-    near = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
-    have = ", ".join(names) or "none"
-    return f": did you mean {near[0]!r}? (have {have})" if near else f": have {have}"
-
-
 def plain(value: Any) -> Any:
     """Return ``value`` with its arrays as lists, as TOML can hold it."""
     if isinstance(value, np.ndarray | np.generic):
@@ -180,13 +175,23 @@ def _refuse_unlike(name: str, value: Any, annotation: Any, kind: str) -> None:
         raise ValueError(f"{name}: got {value!r}, should be {word[annotation]}")
 
 
-def _import(name: str) -> ModuleType:
-    for full in (f"mjspace.controllers.{name}", name):
-        try:
-            return importlib.import_module(full)
-        except ModuleNotFoundError as error:
-            if error.name is None or not full.startswith(error.name):
-                raise ValueError(f"{name!r} cannot be imported: {error}") from error
+@functools.cache
+def controllers() -> dict[str, str]:
+    """Return the full name of each module in controllers/ by the last part, as scenarios name it.
+
+    The folders there are for people: a law keeps its name when it moves to another.
+    """
     package = importlib.import_module("mjspace.controllers")
-    have = sorted(path.stem for path in Path(package.__path__[0]).glob("[a-z]*.py"))
-    raise ValueError(f"no module {name!r}{nearest(name, have)}")
+    found = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+    return {each.name.rpartition(".")[2]: each.name for each in found if not each.ispkg}
+
+
+def _import(name: str) -> ModuleType:
+    have = controllers()
+    full = have.get(name.removeprefix("mjspace.controllers."), name)
+    try:
+        return importlib.import_module(full)
+    except ModuleNotFoundError as error:
+        if error.name is None or not full.startswith(error.name):
+            raise ValueError(f"{name!r} cannot be imported: {error}") from error
+    raise ValueError(f"no module {name!r}{nearest(name, sorted(have))}")

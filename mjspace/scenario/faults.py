@@ -5,8 +5,8 @@ from typing import Any, Literal
 from pydantic import field_validator, model_validator
 
 from mjspace.scenario.fields import Finite, Seconds, Table, Time
-from mjspace.units import any_to_si
 from mjspace.scenario.region import Region
+from mjspace.units import any_to_si
 
 WANTS_VALUE = ("biased", "scaled", "delayed", "noisy")
 

@@ -17,8 +17,8 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
-from mjspace.units import to_si
 from mjspace.ranges import FORMS, Form
+from mjspace.units import to_si
 
 _IN_PEOPLES_UNITS = {"rad": "deg", "rad/s": "deg/s", "m": "km", "s": "min"}
 

@@ -12,9 +12,9 @@ from typing import Any, get_args
 import tomli_w
 from pydantic import BaseModel, ValidationError
 
+from mjspace.errors import InputError, nearest
 from mjspace.scenario import overrides as keys
-from mjspace.scenario.construct import nearest, plain
-from mjspace.errors import InputError
+from mjspace.scenario.construct import plain
 from mjspace.scenario.scenario import Component, Scenario
 
 

@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from mjspace.scenario.deployments import Deployment
-from mjspace.scenario.motors import Pmsm
 from mjspace.scenario.fields import (
     Angles3,
     Finite,
@@ -28,9 +27,10 @@ from mjspace.scenario.fields import (
 from mjspace.scenario.hinges import Bearing, Hinge
 from mjspace.scenario.landing import Engine, Ground
 from mjspace.scenario.magnetics import Magnetorquers
-from mjspace.units import whole_number
-from mjspace.scenario.thrusters import Rcs
+from mjspace.scenario.motors import Pmsm
 from mjspace.scenario.servos import Servos
+from mjspace.scenario.thrusters import Rcs
+from mjspace.units import whole_number
 
 
 class Rates(Table):

@@ -12,17 +12,15 @@ from pydantic import (
     model_validator,
 )
 
+from mjspace.contract import TICK
+from mjspace.ranges import numbers
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.faults import Fault
 from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
-from mjspace.units import any_to_si, whole_number
-from mjspace.ranges import numbers
+from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
 from mjspace.scenario.sensors import Sensors
-from mjspace.scenario.plant import Initial, PlantTable, Rates
-
-_TICK = 1e-9
-"""s: what the log's stamps can tell apart."""
+from mjspace.units import any_to_si, whole_number
 
 
 class Component(BaseModel):
@@ -39,14 +37,14 @@ class Component(BaseModel):
         return dict(self.model_extra or {})
 
 
-class Watched(Region):
+class SignalRegion(Region):
     """Where a logged signal is wanted, or watched."""
 
     name: str
     """What it says in the table of checks, or in the log."""
 
 
-class Event(Watched):
+class EventTable(SignalRegion):
     """What the log is to mention: each time the signal comes into the region, with its value."""
 
     level: Literal["INFO", "WARNING"] = "INFO"
@@ -55,7 +53,7 @@ class Event(Watched):
     """Other signals whose values the line gives as well."""
 
 
-class Check(Watched):
+class Check(SignalRegion):
     """One thing that the flight must show, judged from the log alone."""
 
     statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
@@ -135,13 +133,13 @@ class Check(Watched):
 
     def begins_too_late(self, duration: float) -> bool:
         """Return whether a flight of ``duration`` [s] ends before the window begins."""
-        return self.start > duration + _TICK
+        return self.start > duration + TICK
 
     def is_between_samples(self, period: float) -> bool:
         """Return whether the window lies between two instants of a log of that ``period`` [s]."""
         if self.end is None or self.since is not None:
             return False
-        return math.floor((self.end + _TICK) / period) * period < self.start - _TICK
+        return math.floor((self.end + TICK) / period) * period < self.start - TICK
 
 
 class Scenario(Table):
@@ -166,7 +164,7 @@ class Scenario(Table):
     law: Component
     faults: list[Fault] = []
     checks: list[Check] = []
-    events: list[Event] = []
+    events: list[EventTable] = []
 
     @model_validator(mode="before")
     @classmethod

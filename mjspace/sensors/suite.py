@@ -9,11 +9,11 @@ import numba
 import numpy as np
 
 from mjspace.contract import Array, Measurement
-from mjspace.sensors.noise import normals
-from mjspace.units import whole_number
+from mjspace.scenario.plant import Rates
 from mjspace.scenario.sensors import Errors, Sensors
 from mjspace.sensors.accelerometer import Strapdown
-from mjspace.scenario.plant import Rates
+from mjspace.sensors.noise import normals
+from mjspace.units import whole_number
 
 NAVIGATION = ("position", "velocity", "altitude", "ground_velocity", "specific_force")
 OPTIONAL = (*NAVIGATION, "magnetic_field")

@@ -8,31 +8,31 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.vehicle import indices, deployments, ground_contact, vehicle as plant
-from mjspace.environment import central_gravity, install
 from mjspace.actuators import faults
+from mjspace.actuators.actuator_set import ActuatorSet
 from mjspace.actuators.base import Actuators, IdealThrusters
-from mjspace.actuators.actuator_set import Together
-from mjspace.scenario.construct import construct, load_object
-from mjspace.contract import Array, Law, ReferenceSource
-from mjspace.vehicle.deployments import Deployments
 from mjspace.actuators.engine import GimballedEngine
-from mjspace.errors import blamed_on
 from mjspace.actuators.faults import FaultSet
-from mjspace.environment.geomagnetism import FieldAlongOrbit, along
 from mjspace.actuators.gimbal_servos import GimbalServos
-from mjspace.scenario.hinges import Friction
-from mjspace.scenario.landing import Engine
 from mjspace.actuators.magnetorquers import CoilSet
 from mjspace.actuators.motor_drives import MotorDrives
-from mjspace.simulation.unbatched_law import OneByOne
-from mjspace.vehicle.vehicle import Vehicle
 from mjspace.actuators.reaction_wheels import ReactionWheels
-from mjspace.scenario.scenario import Component, Scenario
-from mjspace.sensors.suite import SensorSuite
-from mjspace.scenario.plant import PlantTable
 from mjspace.actuators.thrusters import Thrusters
+from mjspace.contract import Array, Law, ReferenceSource
+from mjspace.environment import central_gravity, install
+from mjspace.environment.geomagnetism import FieldAlongOrbit, along
+from mjspace.errors import input_error_at
+from mjspace.scenario.construct import construct, load_object
+from mjspace.scenario.hinges import Friction
+from mjspace.scenario.landing import Engine
+from mjspace.scenario.plant import PlantTable
+from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.user_files import files_of, source_of
+from mjspace.sensors.suite import SensorSuite
+from mjspace.simulation.unbatched_law import UnbatchedLaw
+from mjspace.vehicle import deployments, ground_contact, indices
+from mjspace.vehicle.deployments import Deployments
+from mjspace.vehicle.vehicle import Vehicle, build, initial_state
 
 METHODS = {
     "law": ("reset(measurement, reference)", "step(state, time, measurement, reference)"),
@@ -56,7 +56,7 @@ class Assembly:
     """The environment's parameters, one row (nuserdata,)."""
     field: FieldAlongOrbit | None
     """The Earth's magnetic field where the vehicle goes; None where there is none."""
-    actuators: Together
+    actuators: ActuatorSet
     reference: ReferenceSource
     law: Law
     deployed: Callable[[Any], Deployments] | None
@@ -123,7 +123,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
     friction = _friction(scenario.plant)
     ripple = scenario.plant.ripple
     size = install.userdata_size(scenario.environment, friction, ripple)
-    vehicle = _part("plant", partial(plant.build, userdata=size), scenario.plant, scenario.rates)
+    vehicle = _part("plant", partial(build, userdata=size), scenario.plant, scenario.rates)
     facts = {
         "inertia": vehicle.inertia,
         "wheel_axes": vehicle.wheel_axes,
@@ -147,7 +147,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         flown["environment"] = scenario.environment.model_copy(
             update={"python": _in_log("disturbance", kind, disturbance, sources)}
         )
-    qpos, qvel = _part("initial", plant.initial_state, vehicle, scenario.initial)
+    qpos, qvel = _part("initial", initial_state, vehicle, scenario.initial)
     parts = scenario.plant.parts
     deployments.stow(vehicle.model, qpos, parts)
     if scenario.plant.ground is not None:
@@ -168,7 +168,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
         actuators=_part("plant", _actuators, vehicle, scenario, hasattr(law, "inner")),
         reference=reference,
-        law=law if getattr(law, "batched", False) else OneByOne(law),
+        law=law if getattr(law, "batched", False) else UnbatchedLaw(law),
         deployed=deployments.of(vehicle.model, qpos, parts, scenario.rates.physics),
         disturbance=disturbance,
         sources=sources,
@@ -182,7 +182,7 @@ def _component(
     role: str, component: Component, facts: dict[str, Any], folder: Path, sources: dict[str, bytes]
 ) -> tuple[Any, Component]:
     """Return the law or reference and its table as flown; its files are added to ``sources``."""
-    with blamed_on(role):
+    with input_error_at(role):
         kind = load_object(component.kind, folder)
         built, flown = construct(component, kind, facts, folder)
         for method in METHODS[role]:
@@ -216,7 +216,7 @@ def _in_log(role: str, kind: str, found: Any, sources: dict[str, bytes]) -> str:
     return f"{role}/{file}:{name}"
 
 
-def _actuators(vehicle: Vehicle, scenario: Scenario, inner: bool) -> Together:
+def _actuators(vehicle: Vehicle, scenario: Scenario, inner: bool) -> ActuatorSet:
     table, rates, kinds = scenario.plant, scenario.rates, list[Actuators]()
     if table.drives:
         driven = [table.drives[name] for name in vehicle.motors if name in table.drives]
@@ -237,7 +237,7 @@ def _actuators(vehicle: Vehicle, scenario: Scenario, inner: bool) -> Together:
         coils = table.magnetorquers
         axes = np.array(coils.axes) / np.linalg.norm(coils.axes, axis=1, keepdims=True)
         kinds.append(CoilSet(axes, coils.dipole_limit or np.inf, coils.time_constant))
-    return Together(tuple(kinds))
+    return ActuatorSet(tuple(kinds))
 
 
 def _engine(vehicle: Vehicle, table: Engine, scenario: Scenario) -> GimballedEngine:
@@ -282,5 +282,5 @@ def _friction(table: PlantTable) -> dict[str, Friction]:
 
 
 def _part(key: str, build: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-    with blamed_on(key):
+    with input_error_at(key):
         return build(*arguments, **named)

@@ -5,14 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from mjspace.runner.checks import Topics, find_signal, magnitude
-from mjspace.contract import Array
-from mjspace.errors import blamed_on
-from mjspace.scenario.scenario import Event
-from mjspace.simulation.recording import Block, Happening, shapes
+from mjspace.contract import Array, Event
+from mjspace.errors import input_error_at
+from mjspace.scenario.scenario import EventTable
+from mjspace.signals import Topics, find_signal, magnitude
+from mjspace.simulation.recording import Block, shapes
 
 
-def with_crossings(block: Block, declared: Sequence[Event], before: Array) -> tuple[Block, Array]:
+def with_declared_events(
+    block: Block, declared: Sequence[EventTable], before: Array
+) -> tuple[Block, Array]:
     """Return the block with an event for each entry, and who is inside at its end.
 
     ``before`` and what is returned, (N, events), say of each vehicle whether it is inside; one that
@@ -21,13 +23,13 @@ def with_crossings(block: Block, declared: Sequence[Event], before: Array) -> tu
     Raises:
         InputError: an event is of, or shows, no signal of this flight, with the near names.
     """
-    happened: list[Happening] = []
+    happened: list[Event] = []
     after = before.copy()
     topics = shapes(block)
     for number, event in enumerate(declared):
-        with blamed_on(f"events.{number}.signal"):
+        with input_error_at(f"events.{number}.signal"):
             values = magnitude(_rows(block, topics, event.signal))
-        with blamed_on(f"events.{number}.shows"):
+        with input_error_at(f"events.{number}.shows"):
             shown = {name: _rows(block, topics, name) for name in event.shows}
         inside = event.admits(values)
         entered = inside & ~np.concatenate([before[None, :, number], inside[:-1]])
@@ -36,8 +38,8 @@ def with_crossings(block: Block, declared: Sequence[Event], before: Array) -> tu
             text = f"{event.name}: {event.signal} = {values[k, vehicle]:.6g}"
             for name, of_name in shown.items():
                 text += f"; {name} = {' '.join(f'{value:.4g}' for value in of_name[k, vehicle])}"
-            happened.append((float(block.time[k]), int(vehicle), event.level, text))
-    in_order = sorted([*block.events, *happened], key=lambda happening: happening[:2])
+            happened.append(Event(float(block.time[k]), int(vehicle), event.level, text))
+    in_order = sorted([*block.events, *happened], key=lambda event: (event.time, event.vehicle))
     return replace(block, events=in_order), after
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.state_layout import Columns
 from mjspace.contract import Array
 from mjspace.scenario.scenario import Scenario
+from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.state_layout import StateLayout
 
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -50,7 +50,7 @@ def first_start(assembly: Assembly, members: Sequence[int]) -> Start:
     actuators = assembly.actuators.reset(len(members))
     if (faults := assembly.faults(members)) is not None:
         actuators |= faults.reset()
-    columns = Columns(assembly)
+    columns = StateLayout(assembly)
     truth = assembly.actuators.seen(actuators, columns.truth(physics))
     if columns.ground is not None:
         actuators |= columns.ground.reset(physics)

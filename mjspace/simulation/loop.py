@@ -9,18 +9,17 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
+from mjspace.actuators.actuator_set import set_masses
+from mjspace.contract import Array, DesiredMotion, Measurement
 from mjspace.environment import install
-from mjspace.simulation import mujoco_warnings
-from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.state_layout import Columns
-from mjspace.actuators.actuator_set import weigh
-from mjspace.contract import Array, Measurement, Wanted
-from mjspace.simulation.events import with_crossings
 from mjspace.environment.kernel import FIELD
 from mjspace.errors import FlightError
-from mjspace.simulation.user_disturbance import HeldDisturbance
+from mjspace.simulation import mujoco_warnings
+from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.events import with_declared_events
 from mjspace.simulation.initial_state import Start, last_period
-from mjspace.simulation.recording import Block, Tape, until_trouble
+from mjspace.simulation.recording import Block, Recording, until_trouble
+from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_code import (
     check_same_shapes,
     check_state,
@@ -32,6 +31,7 @@ from mjspace.simulation.user_code import (
     sealed,
     shapes_of,
 )
+from mjspace.simulation.user_disturbance import HeldDisturbance
 
 BLOCK_PERIODS = 500
 BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
@@ -69,7 +69,7 @@ def fly(
             tape.block(assembly, flight.columns, saturated), flight.columns
         )
         if len(block.time):
-            block, inside = with_crossings(block, declared, inside)
+            block, inside = with_declared_events(block, declared, inside)
             yield block
         if problem:
             raise FlightError(problem)
@@ -90,7 +90,7 @@ class _Flight:
         scenario = assembly.scenario
         mujoco_warnings.silence()
         install.install()
-        self.assembly, self.columns = assembly, Columns(assembly)
+        self.assembly, self.columns = assembly, StateLayout(assembly)
         self.suite = assembly.sensors(members)
         self.sensors, self.law_state = start.sensors, start.law
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
@@ -126,13 +126,13 @@ class _Flight:
 
     def record(
         self, first: int, last: int, stop: Callable[[], bool]
-    ) -> tuple[Tape, FlightError | None]:
+    ) -> tuple[Recording, FlightError | None]:
         """Fly a block of periods and return the tape, and why it cannot go on, if it cannot."""
         control = self.assembly.scenario.rates.control
         end = min(first + self.periods - 1, last)
         times = np.arange(first, end + 1, dtype=float) * control
         wanted = reference_at(self.assembly.reference, times)
-        tape = Tape(first, wanted)
+        tape = Recording(first, wanted)
         due = clock.monotonic() + BLOCK_SECONDS
         now = first * control
         try:
@@ -157,7 +157,7 @@ class _Flight:
         return tape, None
 
     def _fly_period(
-        self, tape: Tape, period: int, now: float, reference: Wanted, *, flown: bool
+        self, tape: Recording, period: int, now: float, reference: DesiredMotion, *, flown: bool
     ) -> None:
         physics = self.batch.state.copy()
         if self.ground is not None:
@@ -169,7 +169,7 @@ class _Flight:
         tape.sensors.append(self.sensors)
         tape.actuators.append(self.actuator_state)
         measurement = self._measure(period * self.steps, truth)
-        before, command, signals = self._ask_law(now, measurement, reference)
+        before, command, signals = self._step_law(now, measurement, reference)
         if self.faults is not None:
             topics = {"truth": truth, "measurement": measurement, "command": command}
             self.actuator_state, happened = self.faults.decide(
@@ -202,8 +202,8 @@ class _Flight:
         self.sensors, measurement = self.suite.sample(self.sensors, step, truth)
         return measurement if measurement is truth else sealed(measurement)
 
-    def _ask_law(
-        self, now: float, measurement: Measurement, reference: Wanted
+    def _step_law(
+        self, now: float, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
         """Return the law's state before its step, its command and its signals."""
         law = self.assembly.law
@@ -254,7 +254,7 @@ class _Flight:
             self.actuator_state, given = self.faults.change(self.actuator_state, given, now)
         for view, torque in zip(self.applied, given, strict=True):
             view[:] = torque
-        weigh(self.batch, self.actuators.masses(before, self.actuator_state))
+        set_masses(self.batch, self.actuators.masses(before, self.actuator_state))
         return given, saturated
 
     def _truth(self, physics: Array) -> Measurement:
@@ -265,14 +265,14 @@ class _Flight:
             truth = self.ground.seen(self.actuator_state, truth)
         return sealed(truth)
 
-    def _touch(self, tape: Tape, now: float, physics: Array) -> None:
+    def _touch(self, tape: Recording, now: float, physics: Array) -> None:
         """Note what touches the ground at ``now``, which the derived fields describe."""
         if self.ground is not None:
             state, data = self.actuator_state, self.sensordata
             self.actuator_state, happened = self.ground.update(state, physics, data, now)
             tape.happened += happened
 
-    def _rest_of_period(self, tape: Tape, first_step: int, command: Any) -> None:
+    def _rest_of_period(self, tape: Recording, first_step: int, command: Any) -> None:
         """Integrate from the period's first substep to its end, with the samples due in between."""
         step, physics_step = 1, self.assembly.scenario.rates.physics
         looks_always = self.inner is not None or self.push is not None

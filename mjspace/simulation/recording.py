@@ -8,15 +8,11 @@ import mujoco
 import numpy as np
 
 from mjspace import attitude
+from mjspace.contract import TICK, Array, DesiredMotion, Event, Measurement
 from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.state_layout import Columns
-from mjspace.contract import Array, Measurement, Wanted
+from mjspace.simulation.state_layout import StateLayout
 
 Rows = dict[str, dict[str, Array]]
-Happening = tuple[float, int, str, str]
-"""Time [s], vehicle, level (INFO or WARNING) and message of an event."""
-TICK = 1e-9
-"""s: what is closer than this is one instant."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +23,7 @@ class Block:
     """Of the first row."""
     time: Array
     rows: Rows
-    events: list[Happening]
+    events: list[Event]
 
 
 def one_vehicle(block: Block, vehicle: int = 0) -> Rows:
@@ -40,7 +36,7 @@ def shapes(block: Block) -> dict[str, dict[str, tuple[int, ...]]]:
     return {t: {f: a.shape[2:] for f, a in fields.items()} for t, fields in block.rows.items()}
 
 
-def until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:
+def until_trouble(block: Block, columns: StateLayout) -> tuple[Block, str]:
     """Return the block up to the first value that cannot be flown, and which it is ('' if none).
 
     A law may well signal infinity; what must be good is the motion and what acts on it.
@@ -60,16 +56,16 @@ def until_trouble(block: Block, columns: Columns) -> tuple[Block, str]:
         return block, ""
     problem = f"{culprit} is not finite, or beyond 1e10, at t = {block.time[first]:.6g} s"
     rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
-    events = [event for event in block.events if event[0] < block.time[first]]
+    events = [event for event in block.events if event.time < block.time[first]]
     return Block(block.period, block.time[:first], rows, events), problem
 
 
 @dataclass
-class Tape:
+class Recording:
     """One list entry for each control period of a block; arrays have a vehicle axis."""
 
     period: int
-    reference: Wanted
+    reference: DesiredMotion
     """Arrays of at least as many rows as will be recorded, without a vehicle axis."""
     physics: list[Array] = field(default_factory=list)
     actuators: list[dict[str, Array]] = field(default_factory=list)
@@ -82,13 +78,13 @@ class Tape:
     signals: list[Any] = field(default_factory=list)
     push: list[Array] = field(default_factory=list)
     sensordata: list[Array] = field(default_factory=list)
-    happened: list[Happening] = field(default_factory=list)
+    happened: list[Event] = field(default_factory=list)
 
     def __len__(self) -> int:
         """Return the number of whole periods: the sensor data is recorded last."""
         return len(self.sensordata)
 
-    def block(self, assembly: Assembly, columns: Columns, saturated_before: Array) -> Block:
+    def block(self, assembly: Assembly, columns: StateLayout, saturated_before: Array) -> Block:
         """Return the recorded periods as rows."""
         n, vehicle = len(self), assembly.vehicle
         physics = np.array(self.physics[:n])
@@ -145,7 +141,7 @@ class Tape:
         )
         # Also those within the last period; a period that could not be recorded has none.
         end = time[-1] + control - TICK
-        events += [event for event in self.happened if event[0] < end]
+        events += [event for event in self.happened if event.time < end]
         return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
 
 
@@ -178,9 +174,9 @@ def _without_empty(fields: dict[str, Array]) -> dict[str, Array]:
 
 def _saturation_events(
     time: Array, saturated: Array, before: Array, motors: Sequence[str]
-) -> list[Happening]:
+) -> list[Event]:
     rising = saturated & ~np.concatenate([before[None], saturated[:-1]])
     return [
-        (float(time[k]), int(vehicle), "WARNING", f"{motors[motor]} saturated")
+        Event(float(time[k]), int(vehicle), "WARNING", f"{motors[motor]} saturated")
         for k, vehicle, motor in np.argwhere(rising)
     ]

@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 
 from mjspace import attitude
-from mjspace.vehicle import ground_contact
-from mjspace.environment import kepler
-from mjspace.simulation.assembly import Assembly
 from mjspace.contract import Array, Measurement, Truth
+from mjspace.environment import kepler
 from mjspace.sensors.suite import NAVIGATION
+from mjspace.simulation.assembly import Assembly
+from mjspace.vehicle import ground_contact
 
 
-class Columns:
+class StateLayout:
     """Where things stand in a row of MuJoCo's integration state."""
 
     def __init__(self, assembly: Assembly) -> None:

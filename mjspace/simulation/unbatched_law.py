@@ -5,18 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.contract import Law, Measurement, Wanted
+from mjspace.contract import DesiredMotion, Law, Measurement
 from mjspace.errors import FlightError
 from mjspace.simulation.user_code import check_state, check_step
 
 
-class OneByOne:
+class UnbatchedLaw:
     """A law of arrays without a vehicle axis, flown on arrays with one."""
 
     def __init__(self, law: Law) -> None:
         self._law = law
 
-    def reset(self, measurement: Measurement, reference: Wanted) -> Any:
+    def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
         """Return the law's state with a vehicle axis."""
         states = [self._law.reset(one, reference) for one in _vehicles(measurement)]
         for state in states:
@@ -24,7 +24,7 @@ class OneByOne:
         return _stack("state", states)
 
     def step(
-        self, state: Any, time: float, measurement: Measurement, reference: Wanted
+        self, state: Any, time: float, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
         """Return the law's state, command and signals with a vehicle axis."""
         states = _vehicles(state) if state else [state] * len(measurement.rate)

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mjspace.contract import Array, Reference, ReferenceSource, Wanted
+from mjspace.contract import Array, DesiredMotion, Reference, ReferenceSource
 from mjspace.errors import FlightError
 
 Tuple = TypeVar("Tuple", bound=Iterable[Any])
@@ -19,7 +19,7 @@ STEP = (
 )
 
 _LIBRARIES = tuple(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
-_TESTBED = Path(__file__).parent
+_TESTBED = Path(__file__).parents[1]
 
 
 def read_only(arrays: Tuple) -> Tuple:
@@ -50,7 +50,7 @@ def failure(who: str, error: Exception) -> FlightError:
     return FlightError(f"{who} raised {type(error).__name__} at {place}: {error}{hint}")
 
 
-def reference_at(source: ReferenceSource, time: Array) -> Wanted:
+def reference_at(source: ReferenceSource, time: Array) -> DesiredMotion:
     """Return the reference at each ``time`` [s], shape (n,), read-only arrays with n rows.
 
     Raises:

@@ -5,17 +5,17 @@ from typing import Any
 import numpy as np
 
 from mjspace import attitude
-from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.state_layout import Columns
 from mjspace.contract import Array, Measurement, Truth
 from mjspace.errors import FlightError
+from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_code import failure, read_only
 
 
 class HeldDisturbance:
     """A force and torque on the bus, constant over an integration step: first order only."""
 
-    def __init__(self, assembly: Assembly, columns: Columns, applied: Array) -> None:
+    def __init__(self, assembly: Assembly, columns: StateLayout, applied: Array) -> None:
         """Write to ``applied``, (N, 6): MuJoCo's force and torque on the bus, inertial axes."""
         self._disturbance: Any = assembly.disturbance
         self._columns = columns

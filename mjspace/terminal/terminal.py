@@ -5,13 +5,13 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 if TYPE_CHECKING:
-    from mjspace.runner.run import Result
     from mjspace.log.reader import Log
+    from mjspace.runner.run import Result
 
 
 def finish(result: "Result", plot_it: bool, video: bool, as_json: bool, traceback: bool) -> None:
@@ -49,10 +49,10 @@ def finish(result: "Result", plot_it: bool, video: bool, as_json: bool, tracebac
 
 def open_log(path: Path) -> "Log":
     """Return the log at ``path``; InputError when there is none, or nothing in it."""
-    from mjspace.errors import blamed_on
+    from mjspace.errors import input_error_at
     from mjspace.log.reader import Log
 
-    with blamed_on("log"):
+    with input_error_at("log"):
         log = Log(path)
         log.require_periods()
     return log
@@ -90,7 +90,7 @@ def _print_cause(error: Exception) -> None:
 
 
 @contextmanager
-def told_in_one_line() -> Iterator[None]:
+def report_errors() -> Iterator[None]:
     """Turn what a user can mend into one line and an exit status; anything else is a bug."""
     try:
         yield
@@ -110,8 +110,3 @@ def _status(error: Exception) -> int | None:
     if isinstance(error, FlightError | NoRendererError | OSError):
         return 1
     return None
-
-
-def print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Show a warning as one line, in place of ``warnings.showwarning``."""
-    print(f"mjspace: warning: {message}", file=sys.stderr)

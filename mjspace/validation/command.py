@@ -5,8 +5,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from mjspace.errors import InputError, input_error_at
 from mjspace.runner import workers
-from mjspace.errors import InputError, blamed_on
 from mjspace.terminal.options import Json
 from mjspace.terminal.terminal import progress_bar
 
@@ -46,7 +46,7 @@ def validate(
     from mjspace.validation import report, suite, table
     from mjspace.validation.basilisk import compared
 
-    with blamed_on("--only"):
+    with input_error_at("--only"):
         wanted = suite.chosen(only)
     with progress_bar(1.0, "validating", count="") as progress:
         results = suite.validate(wanted, quick=quick, progress=progress)
@@ -66,7 +66,7 @@ def _examine(model: Path, out: Path | None, as_json: bool) -> NoReturn:
     from mjspace.validation import passport, report, table
 
     mujoco_warnings.silence()
-    with blamed_on(f"--model {model}"):
+    with input_error_at(f"--model {model}"):
         issued = passport.issue(model)
     written = () if out is None else report.write_passport(issued, out)
     if as_json:

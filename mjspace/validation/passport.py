@@ -17,13 +17,13 @@ import mujoco
 import numpy as np
 from pydantic import computed_field
 
-from mjspace.vehicle import model_checks, stability
 from mjspace.validation import convergence, model_files, model_ties
 from mjspace.validation.benchmark import Bound
 from mjspace.validation.conservation import MINUTE, Flight
 from mjspace.validation.convergence import Convergence
 from mjspace.validation.model_files import Source
 from mjspace.validation.results import Data, Row
+from mjspace.vehicle import model_checks, stability
 
 STIR = 0.1  # rad/s, m/s
 GOALS = (1e-9, 1e-6)  # rad in a minute

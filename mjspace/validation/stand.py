@@ -14,8 +14,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace.environment import install as environment
 from mjspace.contract import Array
+from mjspace.environment import install as environment
 from mjspace.scenario.environment import Environment
 from mjspace.validation.benchmark import Conditions, Fault
 

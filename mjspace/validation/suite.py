@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mjspace.runner import workers
 from mjspace.log.provenance import software
+from mjspace.runner import workers
 from mjspace.validation import benchmarks
 from mjspace.validation.benchmark import (
     FAULTS,

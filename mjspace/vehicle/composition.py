@@ -8,14 +8,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace.vehicle import ground_contact, mass_properties
-from mjspace.scenario.construct import nearest
 from mjspace.contract import Array
+from mjspace.errors import nearest
 from mjspace.scenario.deployments import Deployment
 from mjspace.scenario.hinges import Hinge
 from mjspace.scenario.landing import Ground
-from mjspace.scenario.thrusters import Rcs
 from mjspace.scenario.plant import Part, PlantTable
+from mjspace.scenario.thrusters import Rcs
+from mjspace.vehicle import ground_contact, mass_properties
 
 _ASSETS = Path(str(files("mjspace.assets")))
 _STOP_SPRING = [0.005, 1.0]  # s, damping ratio: of what turns there, whatever its inertia
@@ -141,7 +141,9 @@ def _bear(joint: Any, hinge: Hinge) -> None:
     joint.damping = [viscous + hinge.viscous_friction, *other]
     if hinge.static_imbalance or hinge.dynamic_imbalance:
         body, axis = joint.parent, joint.axis / np.linalg.norm(joint.axis)
-        own = mass_properties.Inertial(body.mass, body.ipos, *mass_properties.principal(mass_properties.own_inertia(body)))
+        own = mass_properties.Inertial(
+            body.mass, body.ipos, *mass_properties.principal(mass_properties.own_inertia(body))
+        )
         body.mass, body.ipos, body.inertia, body.iquat = mass_properties.off_balance(
             own, axis, hinge, f"plant.hinges.{joint.name}"
         )

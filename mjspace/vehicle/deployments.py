@@ -6,12 +6,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from mjspace.contract import Array
+from mjspace.contract import TICK, Array, Event
 from mjspace.scenario.deployments import Deployment
 
-Event = tuple[float, int, str, str]
-"""Time [s], vehicle, level and message."""
-TICK = 1e-9  # s
 GONE = 1e-12
 """kg left of a weight that was let go: it flies on without being felt."""
 
@@ -116,7 +113,7 @@ class Deployments:
             for moment, what in ((boom.table.at, "sets out"), (boom.end, "is out")):
                 if now - TICK <= moment < now + self._step - TICK:
                     everyone = np.arange(len(self._ctrl))
-                    events += _told(now, everyone, f"{boom.name} {what}")
+                    events += _events(now, everyone, f"{boom.name} {what}")
         for yo_yo in self._yo_yos:
             events += self._unwind(yo_yo, now)
         return events
@@ -130,7 +127,7 @@ class Deployments:
         off = (held == 0.0) & (wound > 0.0) & (angle >= yo_yo.all_off)
         wound[off] = 0.0
         self._forget(yo_yo, off)
-        return _told(now, np.flatnonzero(released), f"{yo_yo.name} is released") + _told(
+        return _events(now, np.flatnonzero(released), f"{yo_yo.name} is released") + _events(
             now, np.flatnonzero(off), f"{yo_yo.name} is let go"
         )
 
@@ -173,5 +170,5 @@ def stow(model: Any, qpos: Array, parts: dict[str, Any]) -> None:
             qpos[[unwind.qposadr[0], pay_out.qposadr[0]]] = angle, cord
 
 
-def _told(now: float, vehicles: Any, what: str) -> list[Event]:
-    return [(now, int(vehicle), "INFO", f"deployment: {what}") for vehicle in vehicles]
+def _events(now: float, vehicles: Any, what: str) -> list[Event]:
+    return [Event(now, int(vehicle), "INFO", f"deployment: {what}") for vehicle in vehicles]

@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace.contract import Array, Measurement
+from mjspace.contract import Array, Event, Measurement
 
 FOOT, HULL = "ground_foot_", "ground_hull_"
 """Beginnings of the names of the sensors that count a body's contacts with the ground."""
@@ -17,8 +17,6 @@ SINKS = 0.005
 
 _FIRST, _NET_FORCE = 0, 3  # a contact sensor's ``reduce``: none and netforce
 _HIGH = 1e5  # m, above any ground
-
-Happening = tuple[float, int, str, str]
 
 
 def add_sensors(spec: Any, ground: str) -> None:
@@ -85,7 +83,7 @@ class GroundContact:
 
     def update(
         self, state: dict[str, Array], physics: Array, sensordata: Array, now: float
-    ) -> tuple[dict[str, Array], list[Happening]]:
+    ) -> tuple[dict[str, Array], list[Event]]:
         """Return the state with what touches at ``now`` [s], and the events of that.
 
         ``physics`` (N, nstate) are the rows of ``now``, which ``sensordata`` describes as well.
@@ -112,16 +110,16 @@ class GroundContact:
         for vehicle in np.flatnonzero(down[:, 0]):
             parts = [self.names[i] for i in np.flatnonzero(foot[vehicle])]
             parts += ["hull"] if hull[vehicle, 0] else []
-            speed = _told(after["touchdown_velocity"][vehicle])
+            speed = _described(after["touchdown_velocity"][vehicle])
             text = f"first contact with the ground: {', '.join(parts)}, at {speed}"
-            happened.append((now, int(vehicle), "INFO", text))
+            happened.append(Event(now, int(vehicle), "INFO", text))
         for vehicle in np.flatnonzero(broken[:, 0]):
             text = "the hull hits the ground"
             if not hull[vehicle, 0]:
                 i = int(np.argmax(crushed[vehicle]))
                 text = f"{self.names[i]} is pressed beyond its stroke of {self.stroke[i]:g} m"
-            text = f"crash: {text}, at {_told(after['crash_velocity'][vehicle])}"
-            happened.append((now, int(vehicle), "ERROR", text))
+            text = f"crash: {text}, at {_described(after['crash_velocity'][vehicle])}"
+            happened.append(Event(now, int(vehicle), "ERROR", text))
         return after, happened
 
     def seen(self, state: dict[str, Array], truth: Measurement) -> Measurement:
@@ -188,6 +186,6 @@ def refuse_buried(model: Any, qpos: Array) -> None:
             )
 
 
-def _told(velocity: Array) -> str:
+def _described(velocity: Array) -> str:
     """Return the speed and the velocity as a person reads them."""
     return f"{np.linalg.norm(velocity):.4g} m/s ({' '.join(f'{v:.4g}' for v in velocity)})"

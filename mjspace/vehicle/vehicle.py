@@ -13,9 +13,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace.vehicle import indices, composition, model_checks, mass_properties
 from mjspace.contract import Array
 from mjspace.scenario.plant import Initial, PlantTable, Rates
+from mjspace.vehicle import composition, indices, mass_properties, model_checks
 
 
 class UnphysicalInertiaWarning(UserWarning):
@@ -81,7 +81,9 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
         gyrostat = np.array(table.vehicle_inertia)
         inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, _others(spec))
     else:
-        inertial, gyrostat = mass_properties.bus(table, mass_properties.own_inertia(spec.body("bus")))
+        inertial, gyrostat = mass_properties.bus(
+            table, mass_properties.own_inertia(spec.body("bus"))
+        )
     model = _compile(spec, inertial)
     model_checks.check(model)
     driven = table.drives if table.servos is None else indices.turned(model)
@@ -211,7 +213,9 @@ def _others(spec: Any) -> list[mass_properties.Inertial]:
             mujoco.mju_mat2Quat(quat, (axes.T @ data.ximat[body].reshape(3, 3)).ravel())
             place = axes.T @ (data.xipos[body] - origin)
             moments = model.body_inertia[body].copy()
-            others.append(mass_properties.Inertial(float(model.body_mass[body]), place, moments, quat))
+            others.append(
+                mass_properties.Inertial(float(model.body_mass[body]), place, moments, quat)
+            )
     return others
 
 

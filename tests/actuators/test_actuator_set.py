@@ -8,16 +8,16 @@ import pytest
 from scipy.integrate import simpson
 
 from mjspace import attitude
-from mjspace.simulation.assembly import assemble
-from mjspace.actuators.actuator_set import Together
+from mjspace.actuators.actuator_set import ActuatorSet
+from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.contract import Measurement, TorqueCommand
 from mjspace.errors import FlightError
+from mjspace.runner.replay import verify
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
-from mjspace.actuators.reaction_wheels import ReactionWheels
-from mjspace.runner.replay import verify
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 TRUTH = Measurement(np.array([[1.0, 0.0, 0.0, 0.0]] * 2), np.zeros((2, 3)), np.zeros((2, 3)))
 LAW = """
@@ -91,7 +91,7 @@ def test_a_law_that_forgets_one_is_told_so() -> None:
     ],
 )
 def test_a_misshapen_command_is_the_laws_fault(torque: Any, message: str) -> None:
-    together = Together((ReactionWheels(np.eye(3)),))
+    together = ActuatorSet((ReactionWheels(np.eye(3)),))
     with pytest.raises(FlightError, match=f"the law's command: {message}"):
         together.act({}, TorqueCommand(torque), TRUTH, 0.1)
 
@@ -102,4 +102,4 @@ def test_what_an_actuator_raises_is_not_blamed_on_the_law() -> None:
             raise KeyError("its own")
 
     with pytest.raises(KeyError, match="its own"):
-        Together((Broken(np.eye(3)),)).act({}, TorqueCommand(np.zeros((2, 3))), TRUTH, 0.1)
+        ActuatorSet((Broken(np.eye(3)),)).act({}, TorqueCommand(np.zeros((2, 3))), TRUTH, 0.1)

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjspace.actuators.engine import GimballedEngine
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement, ThrustCommand
-from mjspace.actuators.engine import GimballedEngine
 from mjspace.scenario.landing import Engine
 
 STEP = 0.002  # s

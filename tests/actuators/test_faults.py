@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mjspace.simulation.assembly import assemble
+from mjspace.actuators.faults import FaultSet, between
+from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.contract import Array
 from mjspace.errors import InputError
-from mjspace.scenario.faults import Fault
-from mjspace.actuators.faults import FaultSet, between
+from mjspace.runner.replay import verify
 from mjspace.runner.run import run
+from mjspace.scenario.faults import Fault
 from mjspace.scenario.loading import load
 from mjspace.sensors.noise import normals
-from mjspace.actuators.reaction_wheels import ReactionWheels
-from mjspace.runner.replay import verify
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 HOLD = 0.1  # s
 MOTORS = ("wheel_0", "wheel_1", "wheel_2")

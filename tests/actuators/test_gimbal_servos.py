@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from mjspace.controllers.cmg.cmg_steering import Cluster, momentum
 
-from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.actuators.gimbal_servos import GimbalServos
 from mjspace.contract import Array, GimbalRateCommand, Measurement
 from mjspace.errors import FlightError, InputError
-from mjspace.runner.run import run
-from mjspace.actuators.gimbal_servos import GimbalServos
-from mjspace.scenario.loading import load
 from mjspace.runner.replay import verify
+from mjspace.runner.run import run
+from mjspace.scenario.loading import load
 from mjspace.scenario.servos import Servos
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 STEP = 0.005  # s
 QUICK = ["checks=[]", "duration=1", "reference.duration=4"]

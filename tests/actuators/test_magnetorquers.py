@@ -10,19 +10,19 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mjspace import attitude
-from mjspace.environment import install
-from mjspace.simulation.assembly import assemble
+from mjspace.actuators.magnetorquers import CoilSet
 from mjspace.contract import Array, Measurement
+from mjspace.environment import install
 from mjspace.environment.kernel import FIELD, MOMENT
-from mjspace.scenario.environment import Environment, Orbit
 from mjspace.errors import InputError
+from mjspace.runner.replay import verify
 from mjspace.runner.run import run
+from mjspace.scenario.environment import Environment, Orbit
 from mjspace.scenario.loading import load
 from mjspace.scenario.magnetics import MagneticField
-from mjspace.actuators.magnetorquers import CoilSet
-from mjspace.runner.replay import verify
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 BALL = """<mujoco>
 <option integrator="RK4" gravity="0 0 0">

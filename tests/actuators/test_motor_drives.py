@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from mjspace.environment import install
-from mjspace.simulation.assembly import assemble
-from mjspace.scenario.environment import Environment
 from mjspace.errors import FlightError, InputError
-from mjspace.runner.run import run
-from mjspace.scenario.loading import load
 from mjspace.log.reader import Log
 from mjspace.runner.replay import replay, verify
-from mjspace.simulation.loop import fly
-from mjspace.simulation.initial_state import first_start
+from mjspace.runner.run import run
+from mjspace.scenario.environment import Environment
+from mjspace.scenario.loading import load
 from mjspace.scenario.plant import Ripple
+from mjspace.simulation.assembly import assemble
+from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 SHORT = "duration=0.05"
 QUIET = ["environment.torques=[]", "checks=[]", SHORT]

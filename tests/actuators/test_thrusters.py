@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from mjspace.actuators.thrusters import Thrusters
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement, PulseCommand
-from mjspace.vehicle.vehicle import build, on_model
-from mjspace.scenario.thrusters import Rcs
 from mjspace.scenario.plant import PlantTable, Rates
-from mjspace.actuators.thrusters import Thrusters
+from mjspace.scenario.thrusters import Rcs
+from mjspace.vehicle.vehicle import build, on_model
 
 STEP, PERIOD, FORCE = 0.005, 0.02, 2.0  # s, s, N
 TANK = """<mujoco><worldbody><body name="rcs_tank">

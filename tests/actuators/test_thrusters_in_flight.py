@@ -5,14 +5,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjspace.simulation.assembly import assemble
 from mjspace.constants import STANDARD_GRAVITY
+from mjspace.rendering.scene import Stage
+from mjspace.runner.replay import verify
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
-from mjspace.runner.replay import verify
-from mjspace.simulation.loop import fly
-from mjspace.rendering.scene import Stage
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 # Pulses that are longer than a period, under way between two, and closed within a step.
 LAW = """

@@ -3,20 +3,19 @@
 import functools
 import importlib
 import inspect
-import pkgutil
 from dataclasses import replace
 from typing import Any
 
-import mjspace.controllers
 import numpy as np
 import pytest
 
 from mjspace import attitude as att
-from mjspace.simulation.assembly import assemble
 from mjspace.contract import Measurement, Reference
+from mjspace.scenario.construct import controllers
 from mjspace.scenario.loading import load, scenario_names
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
@@ -29,15 +28,15 @@ UNFLOWN = {"lander_estimator:EstimatedStructure": "lander-estimated"}
 def laws() -> list[str]:
     """Return ``module:Class`` of every class in controllers/ that is a law."""
     found = []
-    for file in pkgutil.iter_modules(mjspace.controllers.__path__):
-        module = importlib.import_module(f"mjspace.controllers.{file.name}")
+    for short, full in controllers().items():
+        module = importlib.import_module(full)
         for name, kind in vars(module).items():
             if not inspect.isclass(kind) or kind.__module__ != module.__name__ or name[0] == "_":
                 continue
             if inspect.isabstract(kind):
                 continue
             if hasattr(kind, "step") and list(inspect.signature(kind.step).parameters) == STEP:
-                found.append(f"{file.name}:{name}")
+                found.append(f"{short}:{name}")
     return found
 
 

@@ -189,9 +189,9 @@ def test_no_law_needs_the_physics_engine() -> None:
         "import importlib, pkgutil, sys\n"
         "sys.modules['mujoco'] = sys.modules['mcap'] = None\n"
         "import mjspace.controllers as package\n"
-        "for found in pkgutil.iter_modules(package.__path__):\n"
-        "    importlib.import_module(f'mjspace.controllers.{found.name}')\n"
-        "    print(found.name)\n"
+        "for found in pkgutil.walk_packages(package.__path__, package.__name__ + '.'):\n"
+        "    importlib.import_module(found.name)\n"
+        "    print(found.name.rpartition('.')[2])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert {"contraction", "immersion_invariance", "references"} <= set(done.stdout.split())

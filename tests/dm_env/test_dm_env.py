@@ -17,15 +17,15 @@ pytest.importorskip("dm_control")
 
 from dm_env import StepType, TimeStep, test_utils
 
-from mjspace.dm_env import environment as environments
-from mjspace.simulation.assembly import assemble
 from mjspace.contract import Measurement, Reference
+from mjspace.dm_env import environment as environments
 from mjspace.errors import InputError
-from mjspace.vehicle.model_checks import ModelWarning
 from mjspace.scenario.loading import load, scenario_names
-from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import INTEGRATION, first_start
+from mjspace.simulation.loop import fly
+from mjspace.vehicle.model_checks import ModelWarning
+from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore::{kind.__module__}.{kind.__name__}")
@@ -316,8 +316,8 @@ def run_python(code: str) -> str:
 
 def test_a_flight_does_not_import_dm_control(tmp_path: Path) -> None:
     loaded = run_python(
-        "import sys, mjspace.cli, mjspace.replay, mjspace.flight\n"
-        f"mjspace.runner.run.run('contraction-ideal', overrides=['{SHORT}'], out={str(tmp_path)!r})\n"
+        "import sys, mjspace.cli, mjspace.runner.replay\n"
+        f"mjspace.run('contraction-ideal', overrides=['{SHORT}'], out={str(tmp_path)!r})\n"
         "print(sorted(name for name in sys.modules if name.startswith(('dm_', 'absl'))))"
     )
     assert loaded.strip() == "[]"

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from mjspace.contract import Array
 from mjspace.environment import install
 from mjspace.environment.bearing_friction import pack
-from mjspace.contract import Array
 from mjspace.scenario.environment import Environment
-from mjspace.vehicle.model_checks import ModelWarning
 from mjspace.scenario.hinges import Bearing, Friction
+from mjspace.vehicle.model_checks import ModelWarning
 
 WHEEL = """<mujoco><option gravity="0 0 0" integrator="{integrator}" timestep="{step}">
 <flag autoreset="disable"/></option><worldbody>

@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mjspace import attitude
-from mjspace.environment import central_gravity, install
 from mjspace.constants import GM, RADIUS
 from mjspace.contract import Array
+from mjspace.environment import central_gravity, install
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.landing import CentralGravity
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mjspace.contract import Array
-from mjspace.environment.geomagnetism import dipole_of
 from mjspace.environment.dipole import dipole, northern_pole
+from mjspace.environment.geomagnetism import dipole_of
 
 STRENGTH, RADIUS = 7.7e15, 7.0e6  # T m^3, m
 EQUATOR = STRENGTH / RADIUS**3  # T

@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from mjspace import attitude
-from mjspace.environment import install
 from mjspace.constants import GM
 from mjspace.contract import Array
+from mjspace.environment import install
 from mjspace.environment.kernel import MAGIC
 from mjspace.scenario.environment import DisturbanceTorque, Environment, Orbit, Sine
 from mjspace.scenario.hinges import Friction
@@ -257,9 +257,7 @@ def test_small_offsets_do_not_cancel() -> None:
 def test_free_fall_beside_the_reference_is_another_kepler_orbit() -> None:
     other = ELLIPTIC.model_copy(update={"eccentricity": 0.304, "inclination": 0.895})
     model, data = compiled(BODY, Environment(orbit=ELLIPTIC), step=2.0)
-    data.qpos[:3] = install.orbit_position(other, 0.0) - install.orbit_position(
-        ELLIPTIC, 0.0
-    )
+    data.qpos[:3] = install.orbit_position(other, 0.0) - install.orbit_position(ELLIPTIC, 0.0)
     data.qvel[:3] = velocity_at(other, 0.0) - velocity_at(ELLIPTIC, 0.0)
     mujoco.mj_step(model, data, 7000)
     wanted = install.orbit_position(other, 14e3) - install.orbit_position(ELLIPTIC, 14e3)

@@ -7,10 +7,10 @@ import pytest
 from pydantic import ValidationError
 
 from mjspace import attitude
-from mjspace.environment import kepler, dipole
 from mjspace.contract import Array
-from mjspace.scenario.environment import Environment, Orbit
+from mjspace.environment import dipole, kepler
 from mjspace.environment.geomagnetism import along, field_at, sidereal_angle
+from mjspace.scenario.environment import Environment, Orbit
 from mjspace.scenario.magnetics import MagneticField
 from mjspace.scenario.plant import Rates
 

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 
 from mjspace.constants import GM
 from mjspace.environment.install import orbit_position
-from mjspace.scenario.environment import Orbit
 from mjspace.environment.kepler import eccentric_anomaly
+from mjspace.scenario.environment import Orbit
 
 
 @pytest.mark.parametrize("eccentricity", [0.0, 1e-9, 0.1, 0.7, 0.99, 0.999999])

@@ -17,8 +17,8 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.contract import Array
 from mjspace.log.chunk import encode, message
-from mjspace.log.file import LogFile
 from mjspace.log.encoding import Fields, doubles, varint5
+from mjspace.log.file import LogFile
 from mjspace.log.reader import Log
 from mjspace.log.schema import PERIODIC, Scene
 from mjspace.log.writer import LogWriter
@@ -89,7 +89,7 @@ def test_what_describes_the_flight_comes_back(flown: Path) -> None:
     assert log.units == {"/state": {}, "/law": {}, **UNITS}
     ends = np.cumsum(BLOCKS)
     middles = [end - count + count // 2 for end, count in zip(ends, BLOCKS, strict=True)]
-    assert log.events() == [(k / 1000, "WARNING", f"period {k}") for k in middles]
+    assert log.events() == [(k / 1000, 0, "WARNING", f"period {k}") for k in middles]
 
 
 def test_a_clock_that_sums_its_steps_still_ticks_in_whole_milliseconds(tmp_path: Path) -> None:
@@ -112,11 +112,11 @@ def test_an_event_after_the_last_period_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     with create(path) as log:
         write_block(log, 0, 10)
-        log.event(0.009, "INFO", "flushed")
+        log.event(0.009, 0, "INFO", "flushed")
         log.flush()
-        assert Log(path).events()[-1] == (0.009, "INFO", "flushed")
-        log.event(0.009, "ERROR", "closed")
-    assert Log(path).events()[-1] == (0.009, "ERROR", "closed")
+        assert Log(path).events()[-1] == (0.009, 0, "INFO", "flushed")
+        log.event(0.009, 0, "ERROR", "closed")
+    assert Log(path).events()[-1] == (0.009, 0, "ERROR", "closed")
     assert len(Log(path)) == 10
 
 

@@ -7,12 +7,12 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.plotting.decimate import outline
-from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel
 from mjspace.plotting.page import figure, plot
+from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel
 from mjspace.scenario.scenario import Check
 
 ERROR, RATE, SPEED, MOMENTUM = (

@@ -8,10 +8,10 @@ import pytest
 from matplotlib.colors import to_hex, to_rgb
 from PIL import Image
 
-from mjspace.runner.run import run
 from mjspace.log.reader import Log
 from mjspace.plotting.phase_plane import figure, plot
 from mjspace.plotting.style import COLORS, STYLE
+from mjspace.runner.run import run
 
 
 @pytest.fixture(scope="module")

@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mjspace import attitude, run
-from mjspace.rendering import overlay
 from mjspace.environment.install import orbit_position
 from mjspace.errors import NoRendererError
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.rendering import overlay
 from mjspace.rendering.offscreen import Canvas
-from mjspace.vehicle.vehicle import from_bytes
 from mjspace.rendering.render import captions, nearest_rows, render, shares_of_thrust
 from mjspace.rendering.scene import Stage
 from mjspace.rendering.video import Video
+from mjspace.vehicle.vehicle import from_bytes
 
 SIZE = 320, 180
 Pixels = NDArray[np.int64]

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mjspace.runner.checks import find_signal, judge, refuse_unknown
 from mjspace.errors import InputError
-from mjspace.scenario.scenario import Check, Event
+from mjspace.runner.checks import judge, refuse_unknown
+from mjspace.scenario.scenario import Check, EventTable
+from mjspace.signals import find_signal
 
 
-class Tape:
+class Recording:
     """A log in memory: two chunks of one topic."""
 
     topics = {"/truth": {"error": (1,), "rate": (3,)}}  # noqa: RUF012
@@ -39,7 +40,7 @@ RATE = np.outer(ERROR, [3.0, 0.0, 4.0])
 
 def measure(**check: object) -> float:
     check = {"name": "x", "below": 1.0} | check
-    return judge(Tape(ERROR, RATE), [Check.model_validate(check)])[0].measured
+    return judge(Recording(ERROR, RATE), [Check.model_validate(check)])[0].measured
 
 
 @pytest.mark.parametrize(
@@ -64,15 +65,15 @@ def test_a_signal_below_zero_is_judged_without_a_warning() -> None:
         check = Check.model_validate(
             {"name": "x", "signal": "truth.error", "statistic": statistic, "below": 1.0}
         )
-        assert judge(Tape(falling, RATE), [check])[0].measured == pytest.approx(value)
+        assert judge(Recording(falling, RATE), [check])[0].measured == pytest.approx(value)
 
 
 def test_drift_is_from_the_start_of_the_window_not_of_a_chunk() -> None:
     ramp = np.arange(6.0)
     check = Check(name="x", signal="truth.error", statistic="drift", below=1.0)
-    assert judge(Tape(ramp, RATE), [check])[0].measured == 5.0
+    assert judge(Recording(ramp, RATE), [check])[0].measured == 5.0
     late = check.model_copy(update={"start": 0.2})
-    assert judge(Tape(ramp, RATE), [late])[0].measured == 3.0
+    assert judge(Recording(ramp, RATE), [late])[0].measured == 3.0
 
 
 def test_a_vector_is_judged_by_its_norm_and_a_component_by_itself() -> None:
@@ -100,7 +101,7 @@ def test_target_and_relative() -> None:
 )
 def test_bounds(below: float | None, above: float | None, passed: bool) -> None:
     check = Check(name="x", signal="truth.error", below=below, above=above)
-    assert judge(Tape(ERROR, RATE), [check])[0].as_expected is passed
+    assert judge(Recording(ERROR, RATE), [check])[0].as_expected is passed
 
 
 FAILING = {"expected": "FAIL", "because": "it is fast"}
@@ -127,7 +128,7 @@ def test_what_is_not_measured_comes_out_neither_way(expected: dict[str, str]) ->
             check = Check.model_validate(
                 {"name": "x", "signal": "truth.error"} | keys | bound | expected
             )
-            verdict = judge(Tape(signal, RATE), [check], [SMALL, NEVER])[0]
+            verdict = judge(Recording(signal, RATE), [check], [SMALL, NEVER])[0]
             assert verdict.outcome == "not measured"
             assert not verdict.as_expected
             assert verdict.line == f"not measured x: {why}"
@@ -146,7 +147,7 @@ def test_a_check_may_be_expected_to_fail(
     below: float, expected: dict[str, str], as_expected: bool, line: str
 ) -> None:
     check = Check.model_validate({"name": "x", "signal": "truth.error", "below": below} | expected)
-    verdict = judge(Tape(ERROR, RATE), [check])[0]
+    verdict = judge(Recording(ERROR, RATE), [check])[0]
     assert verdict.as_expected is as_expected
     assert verdict.line == line
 
@@ -188,18 +189,18 @@ def test_what_a_check_fails_with_is_one_change_or_several() -> None:
 )
 def test_unknown_signals_are_refused(signal: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        refuse_unknown([Check(name="x", signal=signal, below=1)], Tape.topics)
+        refuse_unknown([Check(name="x", signal=signal, below=1)], Recording.topics)
 
 
 def test_a_target_of_the_wrong_length_is_refused() -> None:
     check = Check(name="x", signal="truth.rate", below=1, target=[1, 2])
     with pytest.raises(InputError, match=r"checks\.0\.target: 2 numbers, truth\.rate has 3"):
-        refuse_unknown([check], Tape.topics)
+        refuse_unknown([check], Recording.topics)
 
 
-SMALL = Event(name="small", signal="truth.error", below=1.5, above=0.0)  # first at 0.3 s
-LOW = Event(name="low", signal="truth.error", below=0.7, above=0.0)  # first at 0.4 s
-NEVER = Event(name="never", signal="truth.error", above=10.0)
+SMALL = EventTable(name="small", signal="truth.error", below=1.5, above=0.0)  # first at 0.3 s
+LOW = EventTable(name="low", signal="truth.error", below=0.7, above=0.0)  # first at 0.4 s
+NEVER = EventTable(name="never", signal="truth.error", above=10.0)
 
 
 def test_some_components_have_a_norm_of_their_own() -> None:
@@ -225,25 +226,25 @@ def test_windows_are_counted_from_events(window: dict[str, str], value: float) -
     check = Check.model_validate(
         {"name": "x", "signal": "truth.error", "statistic": "final", "below": 9.0} | window
     )
-    verdict = judge(Tape(ERROR, RATE), [check], [SMALL, LOW, NEVER])[0]
+    verdict = judge(Recording(ERROR, RATE), [check], [SMALL, LOW, NEVER])[0]
     assert verdict.measured == pytest.approx(value, nan_ok=True)
     assert verdict.outcome == ("not measured" if np.isnan(value) else "PASS")
 
 
 def test_the_line_has_both_bounds_and_a_relative_target_its_scale() -> None:
     both = Check(name="x", signal="truth.error", below=4.0, above=-2.5)
-    verdict = judge(Tape(ERROR, RATE), [both])[0]
+    verdict = judge(Recording(ERROR, RATE), [both])[0]
     assert verdict.bound == "< 4 and > -2.5"
     assert verdict.line == "PASS x: 3 (required < 4 and > -2.5)"
     one = Check(name="x", signal="truth.error", above=3.5)
-    assert judge(Tape(ERROR, RATE), [one])[0].line == "FAIL x: 3 (required > 3.5)"
+    assert judge(Recording(ERROR, RATE), [one])[0].line == "FAIL x: 3 (required > 3.5)"
 
 
 def test_a_target_of_one_number_is_of_each_component() -> None:
     check = Check(name="x", signal="truth.rate", below=1, target=[5.0], statistic="final")
-    refuse_unknown([check], Tape.topics)
+    refuse_unknown([check], Recording.topics)
     last = RATE[-1] - 5.0
-    assert judge(Tape(ERROR, RATE), [check])[0].measured == pytest.approx(np.linalg.norm(last))
+    assert judge(Recording(ERROR, RATE), [check])[0].measured == pytest.approx(np.linalg.norm(last))
 
 
 @pytest.mark.parametrize(

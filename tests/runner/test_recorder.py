@@ -11,15 +11,15 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from mjspace.simulation import loop
-from mjspace.simulation.assembly import Assembly
 from mjspace.contract import Measurement, Reference
-from mjspace.runner.run import run
-from mjspace.scenario.loading import load
 from mjspace.log.chunk import encode
 from mjspace.log.reader import Log
-from mjspace.vehicle.vehicle import from_bytes
 from mjspace.runner.replay import assembly_of
+from mjspace.runner.run import run
+from mjspace.scenario.loading import load
+from mjspace.simulation import loop
+from mjspace.simulation.assembly import Assembly
+from mjspace.vehicle.vehicle import from_bytes
 
 OVERRIDES = [
     "duration=0.1",

@@ -7,20 +7,27 @@ import numpy as np
 import pytest
 from log_samples import rewritten
 
-from mjspace.simulation.assembly import assemble
 from mjspace.contract import Measurement, Reference
 from mjspace.errors import InputError
-from mjspace.runner.run import Result, run
-from mjspace.log.flown_scenario import scenario_of
-from mjspace.scenario.loading import component, to_toml
 from mjspace.log.encoding import doubles
+from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
-from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
-from mjspace.runner.replay import Difference, assembly_of, first_difference, replay, start_of, verify
+from mjspace.runner.replay import (
+    Difference,
+    assembly_of,
+    first_difference,
+    replay,
+    start_of,
+    verify,
+)
+from mjspace.runner.run import Result, run
+from mjspace.scenario.loading import component, to_toml
 from mjspace.scenario.scenario import Scenario
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block, Rows, shapes
+from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
 pytestmark = pytest.mark.filterwarnings(
     f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
@@ -151,7 +158,8 @@ def test_one_bit_of_any_field_is_named(
     everything: Result, tmp_path: Path, topic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The digests name the topic; without them, the flight again names field and time."""
-    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", 7)  # and not in the first block alone
+    # Also where it differs in a block other than the first.
+    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", 7)
     log = everything.log
     for field in log.topics[topic]:
         path = changed_log(log, tmp_path / "one.mcap", topic, field, 30, digests=False)

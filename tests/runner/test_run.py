@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mjspace.simulation import loop
 from mjspace.runner.run import output_folder, run
+from mjspace.simulation import loop
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block
 

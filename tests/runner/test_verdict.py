@@ -8,11 +8,11 @@ import pytest
 
 from mjspace.cli import main
 from mjspace.errors import InputError
-from mjspace.runner.run import run
 from mjspace.log.flown_scenario import scenario_of
-from mjspace.scenario.loading import load, to_toml
 from mjspace.log.reader import Log
 from mjspace.runner.replay import replay
+from mjspace.runner.run import run
+from mjspace.scenario.loading import load, to_toml
 
 SCENARIO = """
 base = "detumble-wheels"

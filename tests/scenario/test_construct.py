@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mjspace.scenario.construct import construct, load_object
 from mjspace.contract import Measurement, Reference
-from mjspace.simulation.unbatched_law import OneByOne
+from mjspace.scenario.construct import construct, load_object
 from mjspace.scenario.scenario import Component
+from mjspace.simulation.unbatched_law import UnbatchedLaw
 
 FACTS = {
     "inertia": np.diag([1.0, 2.0, 3.0]),
@@ -100,7 +100,7 @@ def test_a_law_of_ones_own_is_flown_one_by_one(tmp_path: Path) -> None:
     (tmp_path / "damper.py").write_text(DAMPER)
     law, flown = build("damper.py:Damper", tmp_path, gain=3.0)
     assert flown.gains == {"control_period": 0.01, "gain": 3.0}
-    wrapped = OneByOne(law)
+    wrapped = UnbatchedLaw(law)
     rate = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     absent = [np.zeros((2, 0))] * (len(Measurement._fields) - 2)
     seen = Measurement(np.tile([1.0, 0, 0, 0], (2, 1)), rate, *absent)

@@ -12,8 +12,8 @@ import pytest
 from nonsense import FACTS, first, gains_of, kinds, spoilt, tables
 from pydantic import BaseModel, ValidationError
 
-from mjspace.scenario.construct import construct
 from mjspace.ranges import Range
+from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component
 
 KINDS = dict(kinds())

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from mjspace.scenario.construct import load_object
 from mjspace.contract import Measurement
-from mjspace.runner.run import run
 from mjspace.log.reader import Log
 from mjspace.runner.replay import assembly_of, replay, start_of, verify
+from mjspace.runner.run import run
+from mjspace.scenario.construct import load_object
 from mjspace.scenario.user_files import beside, load_file
 
 LAW = """

@@ -11,10 +11,10 @@ from numpy.random import Generator, Philox, SeedSequence
 
 from mjspace.attitude import conjugate, from_rotation_vector, multiply, to_rotation_vector
 from mjspace.contract import Array, Measurement
-from mjspace.sensors.noise import normals
-from mjspace.scenario.sensors import RateSensor, Sensors, StarTracker
-from mjspace.sensors.suite import OPTIONAL, SensorSuite, State
 from mjspace.scenario.plant import Rates
+from mjspace.scenario.sensors import RateSensor, Sensors, StarTracker
+from mjspace.sensors.noise import normals
+from mjspace.sensors.suite import OPTIONAL, SensorSuite, State
 
 EVERYTHING: dict[str, Any] = {"noise": 1e-2, "bias": 0.1, "bias_walk": 2e-2, "quantization": 1e-3}
 FIVE_SIGMA = 5.0  # an honest generator fails one such test in 1.7 million

@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.constants import STANDARD_GRAVITY
-from mjspace.vehicle.model_checks import ModelWarning
 from mjspace.scenario.loading import load
-from mjspace.simulation.loop import _Flight, fly
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import _Flight, fly
 from mjspace.simulation.recording import Rows, one_vehicle
+from mjspace.vehicle.model_checks import ModelWarning
 
 LAW = """
 from typing import NamedTuple

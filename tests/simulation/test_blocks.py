@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mjspace.contract import Event
+from mjspace.scenario.loading import load, scenario_names
 from mjspace.simulation import loop
 from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.scenario.loading import load, scenario_names
-from mjspace.simulation.loop import fly
 from mjspace.simulation.initial_state import first_start
-from mjspace.simulation.recording import Happening
+from mjspace.simulation.loop import fly
 
 EVENTFUL = [
     "duration=0.6",
@@ -28,7 +28,7 @@ EVENTFUL = [
     "{motor='wheel_0',kind='stuck',when={signal='command.torque[0]',above=-1.5}}]",
 ]
 
-Flown = tuple[dict[str, bytes], list[Happening]]
+Flown = tuple[dict[str, bytes], list[Event]]
 
 
 @pytest.fixture(scope="module")

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mjspace.simulation.assembly import assemble
 from mjspace.contract import Array
 from mjspace.scenario.loading import load
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 from mjspace.validation.benchmarks.double_gimbal import ATTITUDE, DRIVEN, RATE, THESIS
 from mjspace.validation.dgvscmg_equations import derivative, free
 

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from mjspace import run
-from mjspace.simulation.assembly import assemble
-from mjspace.simulation.events import with_crossings
+from mjspace.contract import Event
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load
-from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
-from mjspace.scenario.scenario import Event
-from mjspace.simulation.loop import fly
+from mjspace.scenario.scenario import EventTable
+from mjspace.simulation.assembly import assemble
+from mjspace.simulation.events import with_declared_events
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block
+from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
 pytestmark = pytest.mark.filterwarnings(
     f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
@@ -28,18 +29,18 @@ def block(part: slice = slice(None)) -> Block:
     time = np.arange(5) / 10.0
     rate = np.broadcast_to(RATE[:, None], (5, 2, 3))
     rows = {"/truth": {"error": ERROR[part, :, None], "rate": rate[part]}}
-    return Block(0, time[part], rows, [(0.2, 0, "WARNING", "saturated")])
+    return Block(0, time[part], rows, [Event(0.2, 0, "WARNING", "saturated")])
 
 
-def told(watched: Event, *parts: slice) -> list[tuple[float, int, str, str]]:
+def told(watched: EventTable, *parts: slice) -> list[Event]:
     inside, heard = np.zeros((2, 1), bool), []
     for part in parts or [slice(None)]:
-        seen, inside = with_crossings(block(part), [watched], inside)
-        heard += [event for event in seen.events if event[3] != "saturated"]
+        seen, inside = with_declared_events(block(part), [watched], inside)
+        heard += [event for event in seen.events if event.message != "saturated"]
     return heard
 
 
-LOW = Event(name="low", signal="truth.error", below=1.0)
+LOW = EventTable(name="low", signal="truth.error", below=1.0)
 LINES = [
     (0.0, 1, "INFO", "low: truth.error = 0.5"),
     (0.1, 0, "INFO", "low: truth.error = 0.5"),
@@ -63,15 +64,18 @@ def test_wherever_the_blocks_end() -> None:
 
 
 def test_a_band_of_a_vectors_norm_and_a_component() -> None:
-    band = Event(name="x", signal="truth.rate", above=9.0, below=12.0, level="WARNING")
+    band = EventTable(name="x", signal="truth.rate", above=9.0, below=12.0, level="WARNING")
     assert [event[:3] for event in told(band)] == [
         (t, vehicle, "WARNING") for t in (0.1, 0.3) for vehicle in (0, 1)
     ]
-    assert [e[0] for e in told(Event(name="x", signal="truth.rate[2]", above=11.0))] == [0.2, 0.2]
+    assert [e[0] for e in told(EventTable(name="x", signal="truth.rate[2]", above=11.0))] == [
+        0.2,
+        0.2,
+    ]
 
 
 def test_events_stand_in_order_with_those_of_the_motors() -> None:
-    seen, _ = with_crossings(block(), [LOW], np.zeros((2, 1), bool))
+    seen, _ = with_declared_events(block(), [LOW], np.zeros((2, 1), bool))
     assert [event[0] for event in seen.events] == [0.0, 0.1, 0.2, 0.2, 0.4]
 
 

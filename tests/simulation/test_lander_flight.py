@@ -11,17 +11,17 @@ from lander_oracle import fly as fly_oracle
 from mjspace.controllers.landing.descent import SineDescent
 
 from mjspace import attitude, run
-from mjspace.environment import install
-from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.contract import Array, Measurement, Trajectory
-from mjspace.scenario.environment import Environment
+from mjspace.environment import install
 from mjspace.errors import InputError
-from mjspace.vehicle.model_checks import ModelWarning
+from mjspace.runner.replay import verify
+from mjspace.scenario.environment import Environment
 from mjspace.scenario.landing import CentralGravity
 from mjspace.scenario.loading import load
-from mjspace.runner.replay import verify
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
+from mjspace.vehicle.model_checks import ModelWarning
 
 GM, RADIUS = 4.902e12, 1738e3  # m^3/s^2 and m, the paper's
 SHORT = (  # 8 m beside and 12 m up, in 12 s

@@ -7,16 +7,16 @@ import numpy as np
 import oracle
 import pytest
 
-from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.attitude import rotation_angle
-from mjspace.simulation.state_layout import Columns
 from mjspace.contract import Measurement, Reference
 from mjspace.errors import FlightError
 from mjspace.scenario.loading import load
-from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start
+from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block
+from mjspace.simulation.state_layout import StateLayout
+from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
 pytestmark = pytest.mark.filterwarnings(
     f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
@@ -123,7 +123,7 @@ def test_any_period_is_a_start() -> None:
 def _first_instant(built: Assembly) -> tuple[Measurement, Reference]:
     start = first_start(built, (0,))
     reference = Reference(*(a[0] for a in built.reference.at(np.zeros(1))))
-    return Columns(built).truth(start.physics), reference
+    return StateLayout(built).truth(start.physics), reference
 
 
 LAW = """
@@ -271,7 +271,7 @@ def test_against_an_independent_integration_of_the_sampled_loop(name: str) -> No
     built = assembly(name, "duration=2")
     blocks = flown(built)
     start = first_start(built, (0,))
-    truth = Columns(built).truth(start.physics)
+    truth = StateLayout(built).truth(start.physics)
     other = oracle.fly(
         built.law,
         built.reference,

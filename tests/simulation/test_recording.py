@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mjspace.simulation.assembly import assemble
 from mjspace.attitude import from_euler_zyx, rotate
 from mjspace.contract import Array
 from mjspace.errors import FlightError
 from mjspace.scenario.loading import load
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block, one_vehicle, shapes, until_trouble
 
 GYROSTAT = np.diag([10.0, 12.0, 14.0])  # kg m^2, without the wheels' 0.05 kg m^2 about their axes

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mjspace.simulation.assembly import assemble
 from mjspace.errors import FlightError, InputError
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block
 
 HEAD = """

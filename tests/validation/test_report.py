@@ -149,7 +149,7 @@ def shown(capsys: pytest.CaptureFixture[str], results: Results = RESULTS) -> lis
 def cells(lines: list[str], head: str) -> dict[str, dict[str, str]]:
     """Return the rows of the table whose first column is ``head``: by their first cell, by column.
 
-    Columns are two blanks apart, and no cell of these has two blanks in it.
+    StateLayout are two blanks apart, and no cell of these has two blanks in it.
     """
     begin = next(k for k, line in enumerate(lines) if line.startswith(head))
     starts = [0, *(m.end() for m in re.finditer("  +", lines[begin].rstrip()))]

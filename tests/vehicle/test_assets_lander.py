@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjspace.vehicle import composition
-from mjspace.rendering import plume
 from mjspace.contract import Array
 from mjspace.errors import NoRendererError
-from mjspace.scenario.landing import Ground
+from mjspace.rendering import plume
 from mjspace.rendering.offscreen import Canvas
+from mjspace.scenario.landing import Ground
 from mjspace.scenario.plant import PlantTable, Wheels
+from mjspace.vehicle import composition
 
 ASSETS = Path(__file__).parents[2] / "assets"
 GROUNDS = ["moon_plain", "moon_craters"]

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from mjspace import run
-from mjspace.simulation import loop
-from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.runner.checks import NO_CRASH
-from mjspace.simulation.state_layout import Columns
 from mjspace.contract import Array
 from mjspace.errors import InputError
-from mjspace.scenario.loading import load
+from mjspace.runner.checks import NO_CRASH
 from mjspace.runner.replay import verify
-from mjspace.simulation.loop import fly
+from mjspace.scenario.loading import load
+from mjspace.simulation import loop
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
+from mjspace.simulation.state_layout import StateLayout
 
 GRAVITY = 4.902e12 / 1738e3**2  # m/s^2, at the site
 
@@ -116,7 +116,7 @@ def test_a_crash_fails_the_flight_unless_the_scenario_looks_at_it(tmp_path: Path
 
 def test_without_a_ground_nothing_is_touched() -> None:
     assembly = assemble(*load("lander-printed"))
-    columns = Columns(assembly)
+    columns = StateLayout(assembly)
     assert columns.ground is None
     row = first_start(assembly, (0,)).physics
     row[:, columns.struts] = 0.1

@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjspace.environment import install
-from mjspace.vehicle import model_checks, mass_properties
-from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.contract import Array
+from mjspace.environment import install
 from mjspace.errors import InputError
 from mjspace.scenario.hinges import Hinge
 from mjspace.scenario.loading import load
+from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.vehicle import mass_properties, model_checks
 
 HUGE = (1e8 * np.eye(3)).tolist()
 MOTORS = {"pole_pairs": 4, "resistance": 2.5, "inductance": 4.5e-3, "torque_constant": 1.5}
@@ -134,7 +134,9 @@ def test_imbalance_is_what_was_asked_and_leaves_the_axial_inertia(
     axis: list[float], moments: list[float]
 ) -> None:
     turn = np.array([0.5, 0.1, -0.7, 0.5])
-    body = mass_properties.Inertial(1.6, np.zeros(3), np.array(moments), turn / np.linalg.norm(turn))
+    body = mass_properties.Inertial(
+        1.6, np.zeros(3), np.array(moments), turn / np.linalg.norm(turn)
+    )
     bearing = Hinge(static_imbalance=3e-5, dynamic_imbalance=2e-4)
     askew = mass_properties.off_balance(body, np.array(axis), bearing, "there")
     change = mass_properties.tensor(*askew[2:]) - mass_properties.tensor(*body[2:])

@@ -172,7 +172,9 @@ def test_imbalance_needs_ten_steps_a_revolution(defect: dict[str, str]) -> None:
         warnings.simplefilter("error")
         model_checks.check_imbalance(model(**defect), fastest=600.0)  # 10.5 steps
     # 8.4 steps: (10.5/8.4)^4 times the measured 1.4e-4.
-    with pytest.warns(model_checks.ModelWarning, match=r"8\.38 steps .* off by 0\.0003 .* 0\.00084 s"):
+    with pytest.warns(
+        model_checks.ModelWarning, match=r"8\.38 steps .* off by 0\.0003 .* 0\.00084 s"
+    ):
         model_checks.check_imbalance(model(**defect), fastest=750.0)
 
 

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mjspace.vehicle import model_checks, vehicle as plant
 from mjspace.contract import Array
 from mjspace.scenario.plant import Initial, Part, PlantTable, Rates, Wheels
+from mjspace.vehicle import model_checks
+from mjspace.vehicle import vehicle as plant
 
 PAPER = [[15.0, 5.0, 5.0], [5.0, 10.0, 7.0], [5.0, 7.0, 20.0]]  # H of papers 000 and 002
 PYRAMID = [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [1.0, -1.0, 1.0]]

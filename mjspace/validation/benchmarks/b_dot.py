@@ -7,9 +7,9 @@ import numpy as np
 from scipy.integrate import simpson, solve_ivp
 
 from mjspace import attitude
-from mjspace.environment import kepler
 from mjspace.constants import GM
 from mjspace.contract import Array
+from mjspace.environment import kepler
 from mjspace.scenario.environment import Orbit
 from mjspace.validation import stand
 from mjspace.validation.benchmark import (

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from mjspace.controllers.cmg.dgvscmg import Cascade, State
-from mjspace.controllers.motors.motor_loops import held_current
 from mjspace.controllers.cmg.steering import carried
+from mjspace.controllers.motors.motor_loops import held_current
 
 from mjspace.contract import Measurement, Reference
 

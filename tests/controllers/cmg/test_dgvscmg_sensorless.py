@@ -8,11 +8,11 @@ from mjspace.controllers.cmg.dgvscmg import Cascade
 from mjspace.controllers.cmg.dgvscmg_sensorless import Sensorless
 from mjspace.controllers.motors.sensorless import turned
 
-from mjspace.simulation.assembly import assemble
 from mjspace.contract import Array, Measurement, Reference
 from mjspace.scenario.loading import load
-from mjspace.simulation.loop import fly
+from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
 
 BUS = np.array([[10.5, 0.22, 0.47], [0.22, 12.5, 0.36], [0.47, 0.36, 13.6]])
 AT_REST = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mjspace.controllers.missions.phases import Phases
 from mjspace.controllers.attitude.quaternion_feedback import RateDamping, Switched
+from mjspace.controllers.missions.phases import Phases
 
-from mjspace.scenario.construct import construct, load_object
 from mjspace.contract import Array, Measurement, Reference
-from mjspace.runner.run import run
-from mjspace.scenario.loading import load, to_toml
 from mjspace.runner.replay import verify
+from mjspace.runner.run import run
+from mjspace.scenario.construct import construct, load_object
+from mjspace.scenario.loading import load, to_toml
 from mjspace.scenario.scenario import Component
 
 FACTS = {"wheel_axes": np.eye(3), "wheel_inertia": np.full(3, 0.05), "control_period": 0.1}

@@ -7,8 +7,8 @@ import pytest
 from mjspace.controllers.motors.motor_loops import CurrentLoop, SpeedLoop
 from mjspace.controllers.motors.sensorless import SpeedObserver, held_in_stator, turned
 
-from mjspace.contract import Array
 from mjspace.actuators.pmsm import Drives
+from mjspace.contract import Array
 
 J, P, R, L, KM, STEP = 0.016, 6.0, 3.0, 6e-3, 2.0, 1e-4  # the thesis' wheel, 5.3
 ROWS = 6000

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mjspace.controllers.attitude.turn_kernels import turn
 from mjspace.controllers.thrusters import phase_plane as laws
 from mjspace.controllers.thrusters.relays import State
-from mjspace.controllers.attitude.turn_kernels import turn
 
 from mjspace import attitude as att
 from mjspace.contract import Array, Measurement, Reference

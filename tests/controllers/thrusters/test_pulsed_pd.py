@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mjspace.controllers.references.references import MultiAxis
 from mjspace.controllers.thrusters.allocation import effect
 from mjspace.controllers.thrusters.pulsed_pd import PulsedPd, State
-from mjspace.controllers.references.references import MultiAxis
 
 from mjspace import attitude as att
 from mjspace.contract import Measurement, Reference
