@@ -40,7 +40,7 @@ ROOMS = {
     "rendering": "attitude contract environment errors log scenario vehicle",
     "simulation": "actuators attitude contract environment errors scenario sensors signals vehicle",
     "runner": "contract errors log scenario signals simulation vehicle",
-    "dm_env": "actuators attitude contract environment errors scenario simulation",
+    "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log plotting rendering runner",
     "validation": (
         "attitude constants contract environment errors log plotting runner scenario simulation "

@@ -86,19 +86,6 @@ class ActuatorSet:
         return {k.logged_as: np.array(c) for k, c in zip(self.kinds, columns, strict=True)}
 
 
-def set_masses(batch: Any, masses: list[tuple[str, int, Array]]) -> None:
-    """Give bodies the masses of the middle of the integration step.
-
-    The constants that MuJoCo derives from them take 0.6 of a step's time: they are derived again
-    only where something burns.
-    """
-    fields = [(batch.expand(name)[:, body], values) for name, body, values in masses]
-    if any(not np.array_equal(field, values) for field, values in fields):
-        for field, values in fields:
-            field[:] = values
-        batch.set_const()
-
-
 def _check(command: Any, kind: Actuators, vehicles: int) -> None:
     """Raise FlightError where the law's ``command`` lacks a field that ``kind`` obeys.
 

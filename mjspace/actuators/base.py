@@ -11,6 +11,8 @@ State = dict[str, Array]
 """What actuators remember, vehicle axis first."""
 Fields = dict[str, tuple[int | tuple[int, ...], str]]
 """Fields of a command by name: shape for one vehicle, and unit."""
+Limits = dict[str, tuple[Array, Array]]
+"""Least and largest of fields of a command by name, each of the shape for one vehicle."""
 
 
 class Actuators(Protocol):
@@ -40,6 +42,12 @@ class Actuators(Protocol):
 
     def reset(self, vehicles: int) -> State:
         """Return the state at the start."""
+
+    def limits(self) -> Limits:
+        """Return the least and the largest of each field that it takes, infinite where unlimited.
+
+        They bound what can be applied; a command beyond them is not refused.
+        """
 
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
@@ -73,6 +81,11 @@ class IdealThrusters:
     def reset(self, vehicles: int) -> State:
         """Return no state."""
         return {}
+
+    def limits(self) -> Limits:
+        """Return no limits."""
+        largest = np.full(3, np.inf)
+        return {self.obeys: (-largest, largest)}
 
     def act(
         self, state: State, command: Any, truth: Measurement, step: float

@@ -90,6 +90,11 @@ class GimballedEngine:
             "clock": 0.0 * one,
         }
 
+    def limits(self) -> dict[str, tuple[Array, Array]]:
+        """Return the limits of throttle and deflection; a thrust of zero puts the engine out."""
+        largest, deflection = self.data[1], np.full(2, self.data[4])
+        return {"thrust": (np.zeros(1), np.full(1, largest)), "gimbal": (-deflection, deflection)}
+
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:

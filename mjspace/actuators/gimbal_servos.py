@@ -52,6 +52,11 @@ class GimbalServos:
         """Return integrals of zero: "servo_integral" (N, m) [rad], of gimbals and then wheels."""
         return {"servo_integral": np.zeros((vehicles, len(self.order)))}
 
+    def limits(self) -> dict[str, tuple[Array, Array]]:
+        """Return the fastest rate of each gimbal."""
+        largest = self.loops[: len(self.order) - len(self.wheel_speed), 3]
+        return {"gimbal_rate": (-largest, largest)}
+
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:

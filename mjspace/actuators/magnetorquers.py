@@ -43,6 +43,12 @@ class CoilSet:
         """Return the coils without current: "coil_moment" (N, n) [A m^2], where they lag."""
         return {"coil_moment": np.zeros((vehicles, len(self.axes)))} if self.stateful else {}
 
+    def limits(self) -> dict[str, tuple[Array, Array]]:
+        """Return the moment that the coils together have about each axis."""
+        reach = np.abs(self.axes).sum(axis=0)
+        largest = np.multiply(reach, self.dipole_limit, out=np.zeros(3), where=reach > 0.0)
+        return {"dipole": (-largest, largest)}
+
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:

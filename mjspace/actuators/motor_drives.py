@@ -41,6 +41,11 @@ class MotorDrives:
         """Return currents of zero: "current", (N, m, 2) [A]."""
         return {"current": np.zeros((vehicles, len(self.order), 2))}
 
+    def limits(self) -> dict[str, tuple[Array, Array]]:
+        """Return the supplies' voltages."""
+        longest = np.repeat(self.drives.voltage_limit[:, None], 2, axis=1)
+        return {"voltage": (-longest, longest)}
+
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:

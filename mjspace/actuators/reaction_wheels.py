@@ -95,6 +95,12 @@ class ReactionWheels:
         """Return no state."""
         return {}
 
+    def limits(self) -> dict[str, tuple[Array, Array]]:
+        """Return the torque that the wheels together apply about each axis."""
+        reach = np.abs(self.axes).sum(axis=0)
+        largest = np.multiply(reach, self.torque_limit, out=np.zeros(3), where=reach > 0.0)
+        return {"torque": (-largest, largest)}
+
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:

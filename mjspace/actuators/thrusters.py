@@ -86,6 +86,10 @@ class Thrusters:
             "rcs_propellant": np.full((vehicles, 1), self.propellant),
         }
 
+    def limits(self) -> dict[str, tuple[Array, Array]]:
+        """Return on-times from none to the whole period of a command."""
+        return {"on_time": (np.zeros(self.count), np.full(self.count, self.data[5]))}
+
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:

@@ -4,6 +4,7 @@ Nothing else in mjspace imports this module: dm_control takes a second to import
 MuJoCo's warnings go to its log.
 """
 
+import copy
 import math
 from collections import OrderedDict
 from collections.abc import Iterable
@@ -13,128 +14,157 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from dm_env.specs import BoundedArray
+from mujoco.batch import MODEL_FIELDS
 
 from mjspace import attitude
-from mjspace.actuators.reaction_wheels import ReactionWheels
-from mjspace.contract import Array, DesiredMotion, Measurement
+from mjspace.contract import Array, DesiredMotion, Event, Measurement
 from mjspace.dm_env import bridge
+from mjspace.dm_env.action import Action
 from mjspace.environment import install
 from mjspace.errors import InputError
 from mjspace.scenario import loading
 from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.simulation.initial_state import INTEGRATION, first_start, last_period
+from mjspace.simulation.control_period import ControlPeriod
+from mjspace.simulation.initial_state import INTEGRATION, initial_physics, last_period, start_at
 from mjspace.simulation.loop import BLOCK_PERIODS
-from mjspace.simulation.state_layout import StateLayout
+from mjspace.simulation.stepper import Stepper
 from mjspace.simulation.user_code import reference_at
-from mjspace.simulation.user_disturbance import HeldDisturbance
 
 TOLERATED_ERROR = np.radians(1.0)
 """Attitude error [rad] that earns the full reward where no check of the scenario bounds it."""
-LARGEST_ACCELERATION = 100.0
-"""The action's bound as an angular acceleration [rad/s^2], for wheels without a torque limit."""
 
 
 def load(scenario: str | Path, overrides: Iterable[str] = ()) -> Any:
     """Return the ``dm_control.rl.control.Environment`` of a scenario, by name or path.
 
     ``overrides`` are ``"key=value"``, as ``--set`` takes them. Every episode is the same flight,
-    that of member 0: the scenario's law, flown through the environment, leaves bit for bit the
-    states that ``simulation.fly`` leaves. Other noise is another ``seed``.
+    that of member 0, on the stepper of a flight: the scenario's law, flown through the
+    environment, leaves bit for bit the ``/state`` that ``mjspace run`` logs, if it has no inner
+    loop. Another ``seed`` gives other noise.
 
     Raises:
         InputError: bad input, in one line.
     """
     loaded, folder = loading.load(scenario, overrides)
-    assembly = assemble(loaded, folder)
+    for number, fault in enumerate(loaded.faults):
+        if fault.when is not None and fault.when.signal.removeprefix("/").startswith("law."):
+            raise InputError(
+                f"faults.{number}.when.signal: {fault.when.signal}: an environment flies no law: "
+                "give a signal of truth, measurement or command"
+            )
+    assembly = assemble(loaded, folder, inner=False)
     return bridge.Environment(Physics(assembly), Tracking(assembly), n_sub_steps=loaded.rates.steps)
 
 
 class Physics(bridge.Physics):  # type: ignore[misc]
-    """The scenario's vehicle with its environment and its sensors; controls are motor torques.
+    """The scenario's vehicle in flight; MuJoCo's model and data follow it from period to period.
 
-    A reset is to the scenario's start, and the sensors sample at every integration step that is
-    theirs. A step raises no ``PhysicsError``: ask ``diverged``. After it, as with dm_control's
-    ``legacy_step``, all that depends on position and velocity is up to date, and checked. The
-    sensors remember more than MuJoCo's data hold: there is no ``copy`` and no pickle.
+    A reset is to the scenario's start, or to the state that a task writes during the reset. A step
+    is one control period under the ``command``, with all that a flight has: actuators, sensors,
+    faults, deployments, burning propellant. It raises no ``PhysicsError``: read ``diverged``. After
+    it, as with dm_control's ``legacy_step``, what depends on position and velocity is up to date.
+    Writing to ``data`` changes the flight in a reset alone. Sensors, actuators and effects remember
+    more than MuJoCo's data hold: there is no ``copy`` and no pickle.
     """
 
     def __init__(self, assembly: Assembly) -> None:
-        self._columns = StateLayout(assembly)
         self._assembly = assembly
-        self._momentum = assembly.vehicle.momentum
-        self._rates = assembly.scenario.rates
-        self._start = first_start(assembly, [0]).physics[0]
-        self._suite = assembly.sensors([0])
-        self._period = assembly.scenario.rates.steps
-        self._tick = math.gcd(self._period, *self._suite.ticks)
-        super().__init__(bridge.MjData(bridge.MjModel(assembly.vehicle.model)))
+        self._initial = initial_physics(assembly, 1)[0]
+        self._steps = assembly.scenario.rates.steps
+        self._changed: set[str] = set()
+        # The masses of this copy change as propellant burns.
+        super().__init__(bridge.MjData(bridge.MjModel(copy.copy(assembly.vehicle.model))))
         with self.reset_context():
             pass
 
     def reset(self, keyframe_id: int | None = None) -> None:
         """Return to the scenario's start; the vehicle has no keyframes."""
         install.install()
+        for name in self._changed:
+            _field(self.model.ptr, name)[...] = _field(self._assembly.vehicle.model, name)
         super().reset(keyframe_id)
-        self.set_state(self._start, INTEGRATION)
+        self.set_state(self._initial, INTEGRATION)
 
     def after_reset(self) -> None:
-        """Compute all that depends on the state, and sample the sensors."""
-        super().after_reset()
-        self._steps = 0
-        self._sensors = self._suite.reset(self._truth())
-        self._sample()
+        """Begin a flight at MuJoCo's state and sample the sensors."""
+        state = self.get_state(INTEGRATION)
+        with np.errstate(all="ignore"):
+            self._stepper = Stepper(self._assembly, start_at(self._assembly, state[None], [0]))
+        self._command: Any = None
+        self._events: list[Event] = []
+        self._sense(0)
 
-    def step(self, nstep: int = 1) -> None:
-        """Integrate ``nstep`` steps, with the samples due after each."""
-        end = self._steps + nstep
-        while self._steps < end:
-            count = min(self._tick - self._steps % self._tick, end - self._steps)
-            if self._assembly.disturbance is not None:
-                self._push()
-                count = 1
-            mujoco.mj_step(self.model.ptr, self.data.ptr, count)
-            self._steps += count
-            if self._steps % self._tick == 0:
-                self._sample()
-        mujoco.mj_step1(self.model.ptr, self.data.ptr)
+    def command(self, command: Any) -> None:
+        """Set the command, a named tuple of arrays (1, ...), of the control periods to come."""
+        self._command = command
+
+    def step(self, nstep: int | None = None) -> None:
+        """Fly one control period, with ``nstep`` integration steps.
+
+        Raises:
+            ValueError: ``nstep`` is not the number of integration steps in a control period, or no
+                command has been set.
+            FlightError: a part of the flight, such as the user's disturbance, raised an error.
+            InputError: a fault's signal is not known.
+        """
+        if nstep not in (None, self._steps):
+            raise ValueError(
+                f"nstep is {nstep}: a step is one control period, {self._steps} integration steps"
+            )
+        if self._command is None:
+            raise ValueError("no command: set one with Physics.command before the first step")
+        self._period.command, self._period.signals = self._command, ()
+        with np.errstate(all="ignore"):
+            self._stepper.begin(self._period)
+            self._stepper.finish(self._period)
+        self._events = self._period.events
+        self._sense(self._period.number + 1)
 
     def period(self) -> int:
         """Return the number of control periods flown."""
-        return self._steps // self._period
+        return self._period.number
 
     def truth(self) -> Measurement:
-        """Return what ideal sensors see, without a vehicle axis."""
-        return Measurement(*(values[0] for values in self._truth()))
+        """Return the truth, without a vehicle axis."""
+        return Measurement(*(values[0] for values in self._period.truth))
 
     def measurement(self) -> Measurement:
         """Return what the sensors report, without a vehicle axis."""
-        return Measurement(*(values[0] for values in self._measurement))
+        return Measurement(*(values[0] for values in self._period.measurement))
+
+    def memory(self) -> dict[str, Array]:
+        """Return what actuators, step effects and sensors remember, by the names of /state."""
+        actuators = {f"actuator_{name}": a[0] for name, a in self._period.memory.items()}
+        return actuators | {f"sensor_{name}": a[0] for name, a in self._period.sensors.items()}
+
+    def events(self) -> list[Event]:
+        """Return what happened in the last control period, such as a fault that began."""
+        return list(self._events)
 
     def momentum(self) -> Array:
         """Return the total angular momentum about the centre of mass, inertial [N m s], (3,)."""
-        return np.array(self.data.sensordata[self._momentum])
+        return np.array(self.data.sensordata[self._assembly.vehicle.momentum])
 
     def diverged(self) -> bool:
         """Return whether MuJoCo warned: of a number that is not finite, or beyond 1e10."""
-        return bool(self.data.warning.number.any())
+        return bool(self._stepper.batch.warning[..., 1].any() or self.data.warning.number.any())
 
-    def _truth(self) -> Measurement:
-        return self._columns.truth(self.get_state(INTEGRATION)[None])
-
-    def _sample(self) -> None:
+    def _sense(self, number: int) -> None:
+        """Begin the control period of that number; MuJoCo's model and data follow."""
         with np.errstate(all="ignore"):
-            self._sensors, self._measurement = self._suite.sample(
-                self._sensors, self._steps, self._truth()
-            )
+            self._period: ControlPeriod = self._stepper.sense(number)
+        self.set_state(self._period.physics[0], INTEGRATION)
+        if self._stepper.effects:
+            self._copy_model()
+        mujoco.mj_step1(self.model.ptr, self.data.ptr)
 
-    def _push(self) -> None:
-        """Apply the user's own disturbance, held over one integration step."""
-        period, step = divmod(self._steps, self._period)
-        now = self._steps * self._rates.physics if step else period * self._rates.control
-        applied = self.data.xfrc_applied[self.model.name2id("bus", "body")]
-        push = HeldDisturbance(self._assembly, self._columns, applied[None])
-        push(now, self.get_state(INTEGRATION)[None], self._truth())
+    def _copy_model(self) -> None:
+        """Take over the fields of the model that the flight has changed, such as masses."""
+        for name in MODEL_FIELDS:
+            values = self._stepper.batch.expanded(name)
+            if values is not None:
+                _field(self.model.ptr, name)[...] = values[0]
+                self._changed.add(name)
 
 
 class Tracking(bridge.Task):  # type: ignore[misc]
@@ -142,12 +172,7 @@ class Tracking(bridge.Task):  # type: ignore[misc]
 
     def __init__(self, assembly: Assembly) -> None:
         scenario = assembly.scenario
-        wheels = assembly.actuators.kinds[0]
-        if not isinstance(wheels, ReactionWheels) or len(assembly.actuators.kinds) > 1:
-            raise InputError("plant: an environment's action is a torque for reaction wheels")
-        if scenario.faults or assembly.deployed is not None:
-            raise InputError("faults and deployments: an environment has none")
-        self._wheels, self._inertia = wheels, assembly.vehicle.inertia
+        self._action = Action(assembly)
         self._control, self._last = scenario.rates.control, last_period(scenario)
         self._bounds = [
             (check.start, math.inf if check.end is None else check.end, check.below)
@@ -171,32 +196,26 @@ class Tracking(bridge.Task):  # type: ignore[misc]
         """Change nothing: the physics has been reset to the scenario's start."""
 
     def action_spec(self, physics: Physics) -> Any:
-        """Return the command's: the torque on the bus [N m], body axes, shape (3,).
+        """Return the spec of the command's fields that the actuators take, side by side.
 
-        Its bounds are what the wheels together can give about each axis. Without a torque limit
-        there is no such bound: they are then those of ``LARGEST_ACCELERATION`` of the largest
-        principal inertia. Only the wheels' limits are enforced, wheel by wheel.
+        Its name has a label for each number, with its unit. Bounds are what the actuators can
+        apply: of wheels, what they apply together about each axis. A torque without a limit is
+        bounded by an angular acceleration of 100 rad/s^2 of the largest principal inertia; others
+        without a limit are infinite. Each actuator enforces its own limits, the spec none.
         """
-        largest = LARGEST_ACCELERATION * np.full(3, np.linalg.eigvalsh(self._inertia)[-1])
-        if math.isfinite(self._wheels.torque_limit):
-            largest = self._wheels.torque_limit * np.abs(self._wheels.axes).sum(axis=0)
-        return BoundedArray((3,), np.float64, -largest, largest, name="torque")
+        return self._action.spec()
 
     def before_step(self, action: Array, physics: Physics) -> None:
-        """Share the torque ``action`` among the wheels, for one control period."""
-        with np.errstate(all="ignore"):
-            torque, _ = self._wheels.motor_torque(
-                np.asarray(action, dtype=float), physics.truth().wheel_speed, self._control
-            )
-        physics.set_control(torque)
+        """Command the actuators with ``action`` for one control period."""
+        physics.command(self._action.command(action))
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, Array]:
-        """Return the measurement and, as what is wanted is no secret, the reference."""
+        """Return the measurement, and the reference as the desired motion."""
         named = {
             **physics.measurement()._asdict(),
             **{f"reference_{k}": v for k, v in self._reference(physics)._asdict().items()},
         }
-        # What the vehicle has no sensor for is empty.
+        # Without its sensor, a field is empty.
         return OrderedDict((name, np.array(v)) for name, v in named.items() if v.size)
 
     def get_reward(self, physics: Physics) -> float:
@@ -224,3 +243,9 @@ class Tracking(bridge.Task):  # type: ignore[misc]
         number, row = divmod(physics.period(), BLOCK_PERIODS)
         block = self._block(number)
         return type(block)(*(values[row] for values in block))
+
+
+def _field(model: Any, name: str) -> Any:
+    """Return the array of the model, or of its options, of that name."""
+    option = name.removeprefix("opt.")
+    return getattr(model, name) if option == name else getattr(model.opt, option)

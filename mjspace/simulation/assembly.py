@@ -31,7 +31,6 @@ from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact, indices
-from mjspace.vehicle.deployments import Deployments
 from mjspace.vehicle.vehicle import Vehicle, build, initial_state
 
 METHODS = {
@@ -59,8 +58,8 @@ class Assembly:
     actuators: ActuatorSet
     reference: ReferenceSource
     law: Law
-    deployed: Callable[[Any], Deployments] | None
-    """Makes a batch's deployments; None where nothing is deployed."""
+    inner: bool
+    """Whether the law's inner loop commands the actuators in every integration step."""
     disturbance: Callable[..., tuple[Any, Any]] | None
     """The user's own Python disturbance."""
     sources: dict[str, bytes]
@@ -82,8 +81,7 @@ class Assembly:
     @property
     def driven_stepwise(self) -> bool:
         """Whether the actuators act in every integration step; else once in a control period."""
-        inner = hasattr(self.law, "inner")
-        return inner or self.actuators.stateful or self.faults_between
+        return self.inner or self.actuators.stateful or self.faults_between
 
     @property
     def faults_between(self) -> bool:
@@ -92,12 +90,12 @@ class Assembly:
 
     @property
     def hold(self) -> float:
-        """For how long what the actuators give is held [s]."""
+        """For how long what the actuators apply is held [s]."""
         rates = self.scenario.rates
         return rates.physics if self.driven_stepwise else rates.control
 
     def faults(self, members: Sequence[int]) -> FaultSet | None:
-        """Return the faults of these members of the campaign; None where nothing goes wrong."""
+        """Return the faults of these members of the campaign; None where the scenario has none."""
         scenario = self.scenario
         if not scenario.faults:
             return None
@@ -112,10 +110,13 @@ class Assembly:
         return central_gravity.acceleration(central_gravity.pack(table), position)
 
 
-def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None) -> Assembly:
-    """Return the scenario's assembly; ``folder`` is where the files that it names are.
+def assemble(
+    scenario: Scenario, folder: Path, *, law_folder: Path | None = None, inner: bool = True
+) -> Assembly:
+    """Return the scenario's assembly; ``folder`` holds the files that it names.
 
-    The law's own file is in ``law_folder``, where that is given.
+    The law's own file is in ``law_folder``, if any. Without ``inner`` the actuators are commanded
+    once in a control period, also where the law has an inner loop.
 
     Raises:
         InputError: a part cannot be built, with the scenario's key and what would be right.
@@ -140,6 +141,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         "reference", scenario.reference, facts, folder, sources
     )
     _part("reference", reference.at, np.array([0.0, scenario.duration]))
+    inner = inner and _part("law", _has_inner_loop, law)
     disturbance = None
     kind = scenario.environment.python
     if kind is not None:
@@ -148,8 +150,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             update={"python": _in_log("disturbance", kind, disturbance, sources)}
         )
     qpos, qvel = _part("initial", initial_state, vehicle, scenario.initial)
-    parts = scenario.plant.parts
-    deployments.stow(vehicle.model, qpos, parts)
+    deployments.stow(vehicle.model, qpos, scenario.plant.parts)
     if scenario.plant.ground is not None:
         _part("initial.position", ground_contact.refuse_buried, vehicle.model, qpos)
     assembly = Assembly(
@@ -166,10 +167,10 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
             ripple,
         ),
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
-        actuators=_part("plant", _actuators, vehicle, scenario, hasattr(law, "inner")),
+        actuators=_part("plant", _actuators, vehicle, scenario, inner),
         reference=reference,
         law=law if getattr(law, "batched", False) else UnbatchedLaw(law),
-        deployed=deployments.of(vehicle.model, qpos, parts, scenario.rates.physics),
+        inner=inner,
         disturbance=disturbance,
         sources=sources,
     )
@@ -189,6 +190,17 @@ def _component(
             if not callable(getattr(built, method.partition("(")[0], None)):
                 raise ValueError(f"{component.kind} has no method {method}")
     return built, flown.model_copy(update={"kind": _in_log(role, component.kind, kind, sources)})
+
+
+def _has_inner_loop(law: Any) -> bool:
+    """Tell whether the law has an inner loop; ValueError for one that cannot be flown."""
+    has = hasattr(law, "inner")
+    if has and not getattr(law, "batched", False):
+        raise ValueError(
+            f"{type(law).__name__} has an inner loop and is not batched: write it for arrays with "
+            "a leading vehicle axis, and set its attribute batched = True"
+        )
+    return has
 
 
 def _function(kind: str, folder: Path) -> Callable[..., Any]:

@@ -11,7 +11,9 @@ import numpy as np
 from mjspace.contract import Array
 from mjspace.scenario.scenario import Scenario
 from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.effects import effects_of
 from mjspace.simulation.state_layout import StateLayout
+from mjspace.simulation.truth import truth_of
 
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -28,7 +30,7 @@ class Start:
     law: Any
     """The law's state before it steps in this period; None: the law is reset here."""
     actuators: dict[str, Array] = field(default_factory=dict)
-    """The actuators' state at the period's start."""
+    """What actuators and step effects remember at the period's start."""
     model: dict[str, Array] = field(default_factory=dict)
     """Fields of MuJoCo's model in which the vehicles differ, (N, ...)."""
 
@@ -40,19 +42,26 @@ def last_period(scenario: Scenario) -> int:
 
 def first_start(assembly: Assembly, members: Sequence[int]) -> Start:
     """Return time zero of the scenario for these members."""
+    return start_at(assembly, initial_physics(assembly, len(members)), members)
+
+
+def initial_physics(assembly: Assembly, vehicles: int) -> Array:
+    """Return MuJoCo's integration state at time zero of the scenario, (N, nstate)."""
     model = assembly.vehicle.model
     data = mujoco.MjData(model)
     data.qpos, data.qvel = assembly.qpos, assembly.qvel
     data.userdata = assembly.userdata
     row = np.empty(mujoco.mj_stateSize(model, INTEGRATION))
     mujoco.mj_getState(model, data, row, INTEGRATION)
-    physics = np.repeat(row[None], len(members), axis=0)
-    actuators = assembly.actuators.reset(len(members))
-    if (faults := assembly.faults(members)) is not None:
-        actuators |= faults.reset()
-    columns = StateLayout(assembly)
-    truth = assembly.actuators.seen(actuators, columns.truth(physics))
-    if columns.ground is not None:
-        actuators |= columns.ground.reset(physics)
-        truth = columns.ground.seen(actuators, truth)
-    return Start(0, physics, assembly.sensors(members).reset(truth), None, actuators)
+    return np.repeat(row[None], vehicles, axis=0)
+
+
+def start_at(assembly: Assembly, physics: Array, members: Sequence[int]) -> Start:
+    """Return time zero with the vehicles at ``physics`` (N, nstate) and nothing remembered."""
+    layout = StateLayout(assembly)
+    effects = effects_of(assembly, layout, members)
+    memory = assembly.actuators.reset(len(members))
+    for effect in effects:
+        memory |= effect.reset(physics)
+    truth = truth_of(physics, memory, layout, assembly.actuators, effects)
+    return Start(0, physics, assembly.sensors(members).reset(truth), None, memory)

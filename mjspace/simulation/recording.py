@@ -1,16 +1,20 @@
-"""What a flight records: a list entry for each control period, turned into rows block by block."""
+"""What a flight records: its control periods, turned into rows block by block."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from mjspace import attitude
-from mjspace.contract import TICK, Array, DesiredMotion, Event, Measurement
+from mjspace.contract import Array, DesiredMotion, Event
 from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.state_layout import StateLayout
+from mjspace.simulation.truth import truth_of
+from mjspace.vehicle.step_effect import StepEffect
 
 Rows = dict[str, dict[str, Array]]
 
@@ -36,13 +40,13 @@ def shapes(block: Block) -> dict[str, dict[str, tuple[int, ...]]]:
     return {t: {f: a.shape[2:] for f, a in fields.items()} for t, fields in block.rows.items()}
 
 
-def until_trouble(block: Block, columns: StateLayout) -> tuple[Block, str]:
-    """Return the block up to the first value that cannot be flown, and which it is ('' if none).
+def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
+    """Return the block up to the first value that cannot be flown, and its name ('' if none).
 
-    A law may well signal infinity; what must be good is the motion and what acts on it.
+    A law's signals may be infinite; the motion and what acts on it must be finite.
     """
     acting = {
-        "/state.physics": block.rows["/state"]["physics"][..., columns.moving],
+        "/state.physics": block.rows["/state"]["physics"][..., layout.moving],
         **{f"/measurement.{name}": a for name, a in block.rows["/measurement"].items()},
         **{f"/command.{name}": a for name, a in block.rows["/command"].items()},
     }
@@ -62,101 +66,100 @@ def until_trouble(block: Block, columns: StateLayout) -> tuple[Block, str]:
 
 @dataclass
 class Recording:
-    """One list entry for each control period of a block; arrays have a vehicle axis."""
+    """The control periods of a block, of which the last may end early."""
 
-    period: int
+    first: int
+    """Number of the first period."""
     reference: DesiredMotion
     """Arrays of at least as many rows as will be recorded, without a vehicle axis."""
-    physics: list[Array] = field(default_factory=list)
-    actuators: list[dict[str, Array]] = field(default_factory=list)
-    sensors: list[dict[str, Array]] = field(default_factory=list)
-    law: list[Any] = field(default_factory=list)
-    measurement: list[Measurement] = field(default_factory=list)
-    command: list[Any] = field(default_factory=list)
-    given: list[tuple[Array, ...]] = field(default_factory=list)
-    saturated: list[Array] = field(default_factory=list)
-    signals: list[Any] = field(default_factory=list)
-    push: list[Array] = field(default_factory=list)
-    sensordata: list[Array] = field(default_factory=list)
-    happened: list[Event] = field(default_factory=list)
+    periods: list[ControlPeriod] = field(default_factory=list)
 
     def __len__(self) -> int:
-        """Return the number of whole periods: the sensor data is recorded last."""
-        return len(self.sensordata)
+        """Return the number of periods."""
+        return len(self.periods)
 
-    def block(self, assembly: Assembly, columns: StateLayout, saturated_before: Array) -> Block:
-        """Return the recorded periods as rows."""
+    def _column(self, name: str) -> list[Any]:
+        return list(map(attrgetter(name), self.periods))
+
+    def block(
+        self,
+        assembly: Assembly,
+        layout: StateLayout,
+        effects: Sequence[StepEffect],
+        saturated_before: Array,
+    ) -> Block:
+        """Return the recorded periods as rows; ``saturated_before`` (N, m) holds before them."""
         n, vehicle = len(self), assembly.vehicle
-        physics = np.array(self.physics[:n])
-        data = np.array(self.sensordata)
+        physics = np.array(self._column("physics"))
+        data = np.array(self._column("sensordata"))
         reference = {name: a[:n, None] for name, a in self.reference._asdict().items()}
-        actuators = {
-            name: np.array([s[name] for s in self.actuators[:n]]) for name in self.actuators[0]
-        }
-        truth = assembly.actuators.seen(actuators, columns.truth(physics))
-        on_ground = {}
-        if columns.ground is not None:
-            truth = columns.ground.seen(actuators, truth)
-            on_ground = columns.ground.logged(actuators, data)
+        memory = _stacked(self._column("memory"))
+        truth = truth_of(physics, memory, layout, assembly.actuators, effects)
+        of_effects: dict[str, Array] = {}
+        for effect in effects:
+            of_effects |= effect.logged(memory, data)
         state = {"physics": physics}
-        state |= {f"actuator_{name}": a for name, a in actuators.items()}
-        state |= {f"law_{name}": a for name, a in _fields(self.law[:n]).items()}
-        state |= {
-            f"sensor_{name}": np.array([s[name] for s in self.sensors[:n]])
-            for name in self.sensors[0]
-        }
+        state |= {f"actuator_{name}": a for name, a in memory.items()}
+        state |= {f"law_{name}": a for name, a in _fields(self._column("law")).items()}
+        state |= {f"sensor_{name}": a for name, a in _stacked(self._column("sensors")).items()}
         environment = data[..., vehicle.environment]
-        if self.push:
-            environment = environment + np.array(self.push[:n])
+        if self.periods[0].wrench is not None:
+            environment = environment + np.array(self._column("wrench"))
         rows: Rows = {
             "/state": state,
             "/truth": {
                 **_without_empty(truth._asdict()),
-                **on_ground,
-                "position": physics[..., columns.position],
-                "velocity": physics[..., columns.velocity],
-                **_about_the_place(physics[..., columns.position], truth.attitude, reference),
+                **of_effects,
+                "position": physics[..., layout.position],
+                "velocity": physics[..., layout.velocity],
+                **_position_errors(physics[..., layout.position], truth.attitude, reference),
                 "momentum": data[..., vehicle.momentum],
                 "energy": data[..., vehicle.kinetic],
                 "attitude_error": attitude.rotation_angle(truth.attitude, reference["attitude"])[
                     ..., None
                 ],
             },
-            "/measurement": _fields(self.measurement[:n]),
+            "/measurement": _fields(self._column("measurement")),
             "/reference": {
                 name: np.broadcast_to(a, (n, physics.shape[1], a.shape[-1]))
                 for name, a in reference.items()
             },
             "/command": {
-                **_fields(self.command[:n]),
-                **assembly.actuators.logged(self.given[:n]),
+                **_fields(self._column("command")),
+                **assembly.actuators.logged(self._column("applied")),
             },
-            "/law": _fields(self.signals[:n]),
+            "/law": _fields(self._column("signals")),
             "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
         }
         control = assembly.scenario.rates.control
-        time = (self.period + np.arange(n, dtype=float)) * control
+        time = (self.first + np.arange(n, dtype=float)) * control
         events = _saturation_events(
-            time, np.array(self.saturated[:n], bool), saturated_before, vehicle.motors
+            time,
+            np.array(self._column("saturated"), bool),
+            saturated_before,
+            vehicle.motors,
         )
-        # Also those within the last period; a period that could not be recorded has none.
-        end = time[-1] + control - TICK
-        events += [event for event in self.happened if event.time < end]
-        return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
+        events += [event for period in self.periods for event in period.events]
+        return Block(self.first, time, {t: f for t, f in rows.items() if f}, events)
 
 
-def _about_the_place(
+def _position_errors(
     position: Array, quaternion: Array, reference: dict[str, Array]
 ) -> dict[str, Array]:
-    """Return, for a vehicle that is wanted somewhere, how far it is from there, and how upright.
+    """Return, where the reference has a position, the error from it [m] and the tilt [rad].
 
-    The tilt [rad] is between the body's z and the world's.
+    The tilt is the angle between the body's z and the world's.
     """
     if "position" not in reference:
         return {}
     lean = np.sqrt(quaternion[..., 1] ** 2 + quaternion[..., 2] ** 2)
     tilt = 2.0 * np.arcsin(np.minimum(lean, 1.0))
     return {"position_error": position - reference["position"], "tilt": tilt[..., None]}
+
+
+def _stacked(states: list[dict[str, Array]]) -> dict[str, Array]:
+    """Return named arrays of several periods with a period axis."""
+    return {name: np.array([state[name] for state in states]) for name in states[0]}
 
 
 def _fields(tuples: list[Any]) -> dict[str, Array]:

@@ -10,7 +10,6 @@ from mjspace.contract import Array, Measurement, Truth
 from mjspace.environment import kepler
 from mjspace.sensors.suite import NAVIGATION
 from mjspace.simulation.assembly import Assembly
-from mjspace.vehicle import ground_contact
 
 
 class StateLayout:
@@ -33,7 +32,6 @@ class StateLayout:
         self.wheel_angle = _columns(before_qpos + vehicle.wheel_qpos)
         self.struts = _columns(before_qpos + vehicle.strut_qpos)
         self.feet = len(vehicle.strut_qpos)
-        self.ground = ground_contact.of(model, self.struts, self.velocity)
         sensors = assembly.scenario.sensors
         self.navigates = any(getattr(sensors, name) is not None for name in NAVIGATION)
         self.has_velocimeter = sensors.ground_velocity is not None
@@ -45,7 +43,7 @@ class StateLayout:
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors see, as views of the state rows where that is possible.
 
-        Nothing touches the ground: that is in the actuators' state, which ``ground`` keeps.
+        Nothing touches the ground: that is in the memory of the step effect of the contacts.
         """
         seen = self.motion(physics)
         if self.feet:

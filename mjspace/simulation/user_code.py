@@ -44,7 +44,10 @@ def sealed(arrays: Tuple) -> Tuple:
 
 
 def failure(who: str, error: Exception) -> FlightError:
-    """Return the error that says what ``who``, code of the user's, raised, and in which line."""
+    """Return the error that says what ``who`` raised, and at which line of the user's code.
+
+    Where none of the user's code is involved, it is the line of the testbed's.
+    """
     place = _place(error)
     hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
     return FlightError(f"{who} raised {type(error).__name__} at {place}: {error}{hint}")
@@ -76,7 +79,7 @@ def reference_at(source: ReferenceSource, time: Array) -> DesiredMotion:
 
 
 def check_state(state: Any) -> None:
-    """Refuse what is no state of a law.
+    """Refuse what cannot be a law's state.
 
     Raises:
         FlightError: neither a named tuple nor None.
@@ -108,6 +111,20 @@ def check_step(returned: Any) -> None:
                 f"the law's step returned {_described(returned)}: the {name} must be a named tuple "
                 "of arrays, or None"
             )
+
+
+def check_inner(returned: Any) -> None:
+    """Refuse what a law's inner loop must not return.
+
+    Raises:
+        FlightError: anything but (state, command), with what was returned.
+    """
+    good = type(returned) is tuple and len(returned) == 2
+    if not (good and _is_optional(returned[0]) and _is_named(returned[1])):
+        raise FlightError(
+            f"the law's inner loop returned {_described(returned)}: it must return (state, "
+            "command), named tuples of arrays; state may be None"
+        )
 
 
 def check_vehicle_axis(name: str, arrays: Any, vehicles: int) -> None:
@@ -175,10 +192,11 @@ def _described(value: Any) -> str:
 
 
 def _place(error: Exception) -> str:
-    """Return "file.py:line" of the innermost frame outside of libraries and the testbed."""
+    """Return "file.py:line" of the innermost frame of the user's, else of the testbed's."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if _is_users(Path(frame.filename))]
-    frame = (own or frames)[-1]
+    users = [frame for frame in frames if _is_users(Path(frame.filename))]
+    ours = [frame for frame in frames if Path(frame.filename).is_relative_to(_TESTBED)]
+    frame = (users or ours or frames)[-1]
     return f"{Path(frame.filename).name}:{frame.lineno}"
 
 

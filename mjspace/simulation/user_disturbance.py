@@ -1,39 +1,52 @@
-"""A disturbance of the user's own, in Python: called once a step and held over it."""
+"""A disturbance of the user's own, in Python: evaluated once a step and held over it."""
 
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from mjspace import attitude
-from mjspace.contract import Array, Measurement, Truth
+from mjspace.contract import Array, Truth
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_code import failure, read_only
+from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 
-class HeldDisturbance:
+class UserDisturbance(StepEffect):
     """A force and torque on the bus, constant over an integration step: first order only."""
 
-    def __init__(self, assembly: Assembly, columns: StateLayout, applied: Array) -> None:
-        """Write to ``applied``, (N, 6): MuJoCo's force and torque on the bus, inertial axes."""
+    name: ClassVar[str] = "the disturbance"
+    every_step: ClassVar[bool] = True
+    needs_truth: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, assembly: Assembly, layout: StateLayout) -> Self | None:
+        """Return the scenario's disturbance in Python; None where it has none."""
+        return None if assembly.disturbance is None else cls(assembly, layout)
+
+    def __init__(self, assembly: Assembly, layout: StateLayout) -> None:
+        """Keep what the disturbance and its surroundings need."""
         self._disturbance: Any = assembly.disturbance
-        self._columns = columns
-        self._applied = applied
+        self._layout, self._bus = layout, assembly.vehicle.model.body("bus").id
+        self._applied: Any = None
 
-    def __call__(self, now: float, physics: Array, truth: Measurement) -> Array:
-        """Apply it and return force [N], inertial axes, and torque [N m], body axes, (N, 6).
+    def bind(self, batch: Any) -> None:
+        """Take MuJoCo's force and torque on the bus, inertial axes, (N, 6)."""
+        self._applied = batch.bind("xfrc_applied")[:, self._bus]
 
-        ``physics`` (N, nstate) are the state rows of which ``truth`` is.
+    def before_step(self, memory: State, instant: Instant) -> State:
+        """Apply the disturbance of ``instant`` for the step that begins.
 
         Raises:
             FlightError: the disturbance raised, or returned anything but a force and a torque.
         """
-        known = read_only(self._columns.with_surroundings(physics, truth))
-        wrench = np.array([self._of_one(now, one) for one in map(Truth, *known)])
+        known = read_only(self._layout.with_surroundings(instant.physics, instant.truth))
+        wrench = np.array([self._of_one(instant.time, one) for one in map(Truth, *known)])
         self._applied[:, :3] = wrench[:, :3]
-        self._applied[:, 3:] = attitude.rotate(truth.attitude, wrench[:, 3:])
-        return wrench
+        self._applied[:, 3:] = attitude.rotate(instant.truth.attitude, wrench[:, 3:])
+        self.wrench = wrench
+        return memory
 
     def _of_one(self, now: float, truth: Truth) -> Array:
         try:

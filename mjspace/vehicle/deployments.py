@@ -1,13 +1,13 @@
 """Parts that are deployed in flight: booms driven out on their slides, yo-yos that despin."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from mjspace.contract import TICK, Array, Event
 from mjspace.scenario.deployments import Deployment
+from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 GONE = 1e-12
 """kg left of a weight that was let go: it flies on without being felt."""
@@ -15,7 +15,7 @@ GONE = 1e-12
 
 @dataclass(frozen=True)
 class Boom:
-    """A boom's drive: its position loop is told where the tip shall be."""
+    """A boom's drive: its position loop is commanded the tip's desired distance."""
 
     name: str
     table: Deployment
@@ -24,7 +24,7 @@ class Boom:
     motor: int
     """In ``ctrl``."""
     lead: float
-    """By which the loop's command leads the wanted place, for it not to lag [s]."""
+    """Time by which the loop's command leads the desired distance, against its lag [s]."""
 
     @classmethod
     def of(cls, model: Any, qpos: Array, name: str, table: Deployment) -> Self:
@@ -39,11 +39,11 @@ class Boom:
 
     @property
     def end(self) -> float:
-        """When the tip is told to rest [s]."""
+        """When the tip is commanded to rest [s]."""
         return self.table.at + abs(self._way) / (self.table.rate or 1.0) + self.table.ramp
 
-    def wanted(self, time: float) -> tuple[float, float]:
-        """Return where the tip shall be [m], and how fast [m/s]."""
+    def desired(self, time: float) -> tuple[float, float]:
+        """Return the tip's desired distance [m] and rate [m/s] at ``time`` [s]."""
         since = time - self.table.at
         cruise = self.end - self.table.ramp - self.table.at
         rate = np.copysign(self.table.rate or 0.0, self._way)
@@ -88,27 +88,38 @@ class YoYo:
         return cls(name, table.at, held, wound, weight, place, speed, float(joint.qpos0[0]))
 
 
-class Deployments:
+class Deployments(StepEffect):
     """What is deployed on a batch of vehicles; memory is in MuJoCo's state alone.
 
-    To be called at the beginning of every integration step. A weight is let go in the step that
-    begins nearest to where its cord is off the drum; of what is let go no mass is left, so that
-    the bus is rid of it.
+    A weight is let go in the step that begins nearest to where its cord is off the drum; its mass
+    is then removed from the model, so that the bus no longer carries it.
     """
 
-    def __init__(self, booms: list[Boom], yo_yos: list[YoYo], batch: Any, step: float) -> None:
-        """Bind the ``batch`` (``mujoco.batch.Batch``); ``step`` [s] is the integration's."""
-        self._booms, self._yo_yos, self._step, self._batch = booms, yo_yos, step, batch
+    name: ClassVar[str] = "the deployment"
+    every_step: ClassVar[bool] = True
+
+    def __init__(self, booms: list[Boom], yo_yos: list[YoYo], step: float) -> None:
+        """Keep what is deployed; ``step`` [s] is the integration's."""
+        self._booms, self._yo_yos, self._step = booms, yo_yos, step
+        self._batch: Any = None
+        self._ctrl: Any = None
+        self._active: Any = None
+        self._qpos: Any = None
+        self._qvel: Any = None
+
+    def bind(self, batch: Any) -> None:
+        """Take motors, equalities and joints; remove weights that are gone already."""
+        self._batch = batch
         self._ctrl, self._active = batch.bind("ctrl"), batch.bind("eq_active")
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        for yo_yo in yo_yos:
-            self._forget(yo_yo, self._active[:, [yo_yo.held, yo_yo.wound]].max(axis=1) == 0.0)
+        for yo_yo in self._yo_yos:
+            self._remove(yo_yo, self._active[:, [yo_yo.held, yo_yo.wound]].max(axis=1) == 0.0)
 
-    def __call__(self, now: float) -> list[Event]:
-        """Act for the step that begins at ``now`` [s] and return what happens."""
-        events: list[Event] = []
+    def before_step(self, memory: State, instant: Instant) -> State:
+        """Drive the booms, release and let go of weights, and report it."""
+        now, events = instant.time, instant.events
         for boom in self._booms:
-            place, rate = boom.wanted(now + 0.5 * self._step)
+            place, rate = boom.desired(now + 0.5 * self._step)
             self._ctrl[:, boom.motor] = place + boom.lead * rate
             for moment, what in ((boom.table.at, "sets out"), (boom.end, "is out")):
                 if now - TICK <= moment < now + self._step - TICK:
@@ -116,33 +127,31 @@ class Deployments:
                     events += _events(now, everyone, f"{boom.name} {what}")
         for yo_yo in self._yo_yos:
             events += self._unwind(yo_yo, now)
-        return events
+        return memory
 
     def _unwind(self, yo_yo: YoYo, now: float) -> list[Event]:
         held, wound = self._active[:, yo_yo.held], self._active[:, yo_yo.wound]
         released = (held > 0.0) & (now >= yo_yo.at - TICK)
         held[released] = 0.0
-        # Where it will be half a step from now.
+        # The angle half a step from now.
         angle = self._qpos[:, yo_yo.place] + 0.5 * self._step * self._qvel[:, yo_yo.speed]
         off = (held == 0.0) & (wound > 0.0) & (angle >= yo_yo.all_off)
         wound[off] = 0.0
-        self._forget(yo_yo, off)
+        self._remove(yo_yo, off)
         return _events(now, np.flatnonzero(released), f"{yo_yo.name} is released") + _events(
             now, np.flatnonzero(off), f"{yo_yo.name} is let go"
         )
 
-    def _forget(self, yo_yo: YoYo, gone: Any) -> None:
+    def _remove(self, yo_yo: YoYo, gone: Any) -> None:
         if gone.any():
             self._batch.expand("body_mass")[gone, yo_yo.weight] = GONE
             self._batch.set_const()
 
 
-def of(
-    model: Any, qpos: Array, parts: dict[str, Any], step: float
-) -> Callable[[Any], Deployments] | None:
-    """Return what makes a batch's ``Deployments`` of the plant's ``parts``; None where none is.
+def of(model: Any, qpos: Array, parts: dict[str, Any], step: float) -> Deployments | None:
+    """Return the deployments of the plant's ``parts``; None where there are none.
 
-    ``qpos`` (nq,) is where the vehicle starts, ``step`` [s] the integration's.
+    ``qpos`` (nq,) is the vehicle's at the start, ``step`` [s] the integration's.
     """
     deployed = {name: part for name, part in parts.items() if part.deployment is not None}
     if not deployed:
@@ -157,11 +166,11 @@ def of(
         for name, part in deployed.items()
         if part.part == "yo_yo"
     ]
-    return lambda batch: Deployments(booms, yo_yos, batch, step)
+    return Deployments(booms, yo_yos, step)
 
 
 def stow(model: Any, qpos: Array, parts: dict[str, Any]) -> None:
-    """Put the weights of the yo-yos among the plant's ``parts`` where they are held."""
+    """Set in ``qpos`` the joints of the yo-yos among ``parts`` to where the weights are held."""
     for name, part in parts.items():
         if part.part == "yo_yo" and part.deployment is not None:
             angle = part.deployment.unwound

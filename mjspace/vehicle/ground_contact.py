@@ -1,12 +1,13 @@
 """What touches the ground: each foot and the hull, how fast it came, and whether it crashed."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
 
 from mjspace.contract import Array, Event, Measurement
+from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 FOOT, HULL = "ground_foot_", "ground_hull_"
 """Beginnings of the names of the sensors that count a body's contacts with the ground."""
@@ -20,7 +21,7 @@ _HIGH = 1e5  # m, above any ground
 
 
 def add_sensors(spec: Any, ground: str) -> None:
-    """Let each body of the vehicle that can touch the geom ``ground`` show that it does.
+    """Let sensors report the contacts of each body of the vehicle that can touch ``ground``.
 
     A body on a landing leg's strut is a foot, any other is part of the hull.
     """
@@ -29,7 +30,7 @@ def add_sensors(spec: Any, ground: str) -> None:
             continue
         foot = any(joint.name.endswith("_strut") for joint in body.joints)
         name = f"{FOOT if foot else HULL}{body.name}"
-        for ending, shows, reduced in (
+        for ending, reported, reduced in (
             ("", mujoco.mjtConDataField.mjCONDATA_FOUND, _FIRST),
             (FORCE, mujoco.mjtConDataField.mjCONDATA_FORCE, _NET_FORCE),
         ):
@@ -40,19 +41,19 @@ def add_sensors(spec: Any, ground: str) -> None:
                 objname=body.name,
                 reftype=mujoco.mjtObj.mjOBJ_GEOM,
                 refname=ground,
-                intprm=[1 << int(shows), reduced, 1],
+                intprm=[1 << int(reported), reduced, 1],
             )
 
 
-@dataclass(frozen=True)
-class GroundContact:
-    """The contacts of a batch of vehicles with the ground; all memory in the state.
+@dataclass(eq=False)
+class GroundContact(StepEffect):
+    """The contacts of a batch of vehicles with the ground, looked for at every integration step.
 
-    The state's fields, (N, ...): "ground_foot" and "ground_hull", 1.0 while it touches;
-    "ground_touched" and "ground_crashed", 1.0 from the first time on; "touchdown_velocity" and
-    "crash_velocity", the bus's, inertial axes [m/s], one integration step before that, and until
-    then the velocity of now. A crash is a hull that touches, or a strut pressed beyond its stroke.
+    A crash is a hull that touches, or a strut pressed beyond its stroke.
     """
+
+    name: ClassVar[str] = "the ground contact"
+    every_step: ClassVar[bool] = True
 
     feet: Any
     """Of each foot, the index of its number of contacts in ``sensordata``, shape (f,)."""
@@ -63,14 +64,26 @@ class GroundContact:
     names: tuple[str, ...]
     """Of the feet."""
     struts: Any
-    """Where the legs' struts are in a row of the integration state."""
+    """Columns of the legs' struts in a row of the integration state."""
     stroke: Array
     """By how much each can be pressed [m], shape (f,)."""
     velocity: slice
-    """Where the bus's velocity is."""
+    """Columns of the bus's velocity, inertial axes, likewise."""
+    _batch: Any = field(init=False, repr=False, default=None)
+    _sensordata: Any = field(init=False, repr=False, default=None)
 
-    def reset(self, physics: Array) -> dict[str, Array]:
-        """Return the state at the start, before it is known what touches."""
+    def bind(self, batch: Any) -> None:
+        """Take the batch, and its sensors that count contacts."""
+        self._batch, self._sensordata = batch, batch.bind("sensordata")
+
+    def reset(self, physics: Array) -> State:
+        """Return the state at the start, before it is known what touches.
+
+        Its fields, (N, ...): "ground_foot" and "ground_hull", 1.0 while it touches;
+        "ground_touched" and "ground_crashed", 1.0 from the first time on; "touchdown_velocity" and
+        "crash_velocity", the bus's, inertial axes [m/s], one integration step before that, and
+        until then the present velocity.
+        """
         none, velocity = np.zeros((len(physics), 1)), physics[:, self.velocity]
         return {
             "ground_foot": np.zeros((len(physics), len(self.feet))),
@@ -81,13 +94,24 @@ class GroundContact:
             "crash_velocity": velocity,
         }
 
-    def update(
-        self, state: dict[str, Array], physics: Array, sensordata: Array, now: float
-    ) -> tuple[dict[str, Array], list[Event]]:
-        """Return the state with what touches at ``now`` [s], and the events of that.
+    def observe(self, memory: State, physics: Array, time: float, events: list[Event]) -> State:
+        """Return the memory with what touches at a control instant."""
+        # At stage POS alone, MuJoCo 4.0 computes no kinetic energy in the step that follows.
+        self._batch.forward(stage=mujoco.mjtStage.mjSTAGE_VEL)
+        return self._update(memory, physics, time, events)
 
-        ``physics`` (N, nstate) are the rows of ``now``, which ``sensordata`` describes as well.
+    def after_step(self, memory: State, instant: Instant) -> State:
+        """Return the memory with what touched at ``instant``, if ``observe`` did not look then."""
+        if instant.is_control:
+            return memory
+        return self._update(memory, instant.physics, instant.time, instant.events)
+
+    def _update(self, state: State, physics: Array, now: float, events: list[Event]) -> State:
+        """Return the state with what touches at ``now`` [s], and add to the ``events``.
+
+        ``physics`` (N, nstate) are the rows of ``now``, which the sensors describe as well.
         """
+        sensordata = self._sensordata
         foot: Any = sensordata[:, self.feet] > 0.0
         hull: Any = (sensordata[:, self.hull] > 0.0).any(axis=1, keepdims=True)
         crushed: Any = physics[:, self.struts] > self.stroke
@@ -106,42 +130,44 @@ class GroundContact:
             ),
             "crash_velocity": np.where(crashed | crashes, state["crash_velocity"], velocity),
         }
-        happened = []
         for vehicle in np.flatnonzero(down[:, 0]):
             parts = [self.names[i] for i in np.flatnonzero(foot[vehicle])]
             parts += ["hull"] if hull[vehicle, 0] else []
             speed = _described(after["touchdown_velocity"][vehicle])
             text = f"first contact with the ground: {', '.join(parts)}, at {speed}"
-            happened.append(Event(now, int(vehicle), "INFO", text))
+            events.append(Event(now, int(vehicle), "INFO", text))
         for vehicle in np.flatnonzero(broken[:, 0]):
             text = "the hull hits the ground"
             if not hull[vehicle, 0]:
                 i = int(np.argmax(crushed[vehicle]))
                 text = f"{self.names[i]} is pressed beyond its stroke of {self.stroke[i]:g} m"
             text = f"crash: {text}, at {_described(after['crash_velocity'][vehicle])}"
-            happened.append(Event(now, int(vehicle), "ERROR", text))
-        return after, happened
+            events.append(Event(now, int(vehicle), "ERROR", text))
+        return after
 
-    def seen(self, state: dict[str, Array], truth: Measurement) -> Measurement:
+    def add_to_truth(self, memory: State, truth: Measurement) -> Measurement:
         """Return the truth with what touches the ground."""
-        foot, hull = state["ground_foot"], state["ground_hull"]
+        foot, hull = memory["ground_foot"], memory["ground_hull"]
         stands = (foot.sum(axis=-1, keepdims=True) >= 2.0) | (hull > 0.0)
         return truth._replace(contact=stands.astype(float), foot_contact=foot, hull_contact=hull)
 
-    def logged(self, state: dict[str, Array], sensordata: Array) -> dict[str, Array]:
-        """Return what /truth shows besides."""
+    def logged(self, memory: State, sensordata: Array) -> dict[str, Array]:
+        """Return the forces of the contacts, and how it touched down or crashed."""
         force = np.linalg.norm(sensordata[..., self.force], axis=-1)
         return {
             "foot_force": force[..., : len(self.feet)],
             "hull_force": force[..., len(self.feet) :].sum(axis=-1, keepdims=True),
-            "touchdown_velocity": state["touchdown_velocity"],
-            "crash": state["ground_crashed"],
-            "crash_velocity": state["crash_velocity"],
+            "touchdown_velocity": memory["touchdown_velocity"],
+            "crash": memory["ground_crashed"],
+            "crash_velocity": memory["crash_velocity"],
         }
 
 
 def of(model: Any, struts: Any, velocity: slice) -> GroundContact | None:
-    """Return the contacts of a model that has a ground, with its columns; None without."""
+    """Return the contacts of a ``model`` with its ground; None where it has none.
+
+    ``struts`` and ``velocity`` are columns of the integration state, as ``GroundContact`` has them.
+    """
     sensors = [model.sensor(i) for i in range(model.nsensor)]
     counts = [s for s in sensors if s.name.startswith((FOOT, HULL)) and not s.name.endswith(FORCE)]
     if not counts:
@@ -165,7 +191,7 @@ def refuse_buried(model: Any, qpos: Array) -> None:
     """Refuse a vehicle that would begin in the ground: it would be shot up.
 
     Raises:
-        ValueError: what would be how deep.
+        ValueError: a geom is too deep in the ground, with its depth.
     """
     data = mujoco.MjData(model)
     data.qpos = qpos

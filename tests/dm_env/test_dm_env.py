@@ -17,11 +17,11 @@ pytest.importorskip("dm_control")
 
 from dm_env import StepType, TimeStep, test_utils
 
-from mjspace.contract import Measurement, Reference
+from mjspace.contract import Measurement
 from mjspace.dm_env import environment as environments
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load, scenario_names
-from mjspace.simulation.assembly import assemble
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import INTEGRATION, first_start
 from mjspace.simulation.loop import fly
 from mjspace.vehicle.model_checks import ModelWarning
@@ -49,14 +49,6 @@ WIND = """
 def wind(time, truth):
     return [time, 0.0, 1.0], truth.rate * [1.0, 2.0, 3.0] - time
 """
-
-
-def wheeled(name: str) -> bool:
-    scenario, _ = load(name)
-    plant = scenario.plant
-    others = plant.rcs or plant.magnetorquers or plant.ideal_thrusters
-    deployed = any(part.deployment for part in plant.parts.values())
-    return bool(plant.wheels.axes) and not (others or deployed or scenario.faults)
 
 
 class _Conformance(test_utils.EnvironmentTestMixin):
@@ -96,51 +88,71 @@ class TestDivergence(_Conformance, TestCase):
             yield np.full(3, np.nan if index % 7 == 3 else 1e9)
 
 
-@pytest.mark.parametrize("scenario", [name for name in scenario_names() if wheeled(name)])
-def test_every_scenario_with_reaction_wheels_is_an_environment(scenario: str) -> None:
+class TestEngine(_Conformance, TestCase):
+    scenario = "lander"
+    overrides = ("duration=0.2",)
+
+
+class TestCoils(_Conformance, TestCase):
+    scenario = "b-dot"
+    overrides = ("duration=40", "initial.rate=[0.1, 0, 0]")
+
+
+OF_A_LAW = {"wheel-stuck"}
+"""Their faults begin with a signal of the law."""
+
+
+@pytest.mark.parametrize("scenario", sorted(OF_A_LAW))
+def test_a_fault_that_depends_on_a_law_is_refused(scenario: str) -> None:
+    with pytest.raises(InputError, match=r"faults\.0\.when\.signal: law\.path: an environment fl"):
+        environments.load(scenario)
+
+
+@pytest.mark.parametrize("scenario", sorted({*scenario_names()} - OF_A_LAW))
+def test_every_scenario_is_an_environment(scenario: str) -> None:
     environment = environments.load(scenario)
     environment.reset()
-    step = environment.step(np.zeros(3))
+    spec = environment.action_spec()
+    step = environment.step(np.clip(np.zeros(spec.shape), spec.minimum, spec.maximum))
     assert step.mid()
     assert 0.0 < step.reward <= 1.0
+    assert len(spec.name.split("\t")) == spec.shape[0]
 
 
-@pytest.mark.parametrize("scenario", ["wheel-failure", "mission"])
-def test_what_goes_wrong_or_out_makes_no_environment(scenario: str) -> None:
-    with pytest.raises(InputError, match="faults and deployments: an environment has none"):
-        environments.load(scenario)
-
-
-@pytest.mark.parametrize("scenario", ["dgvscmg-tracking", "pd-plus"])
-def test_other_motors_make_no_environment(scenario: str) -> None:
-    with pytest.raises(InputError, match="a torque for reaction wheels"):
-        environments.load(scenario)
-
-
-def seen(step: TimeStep) -> tuple[Measurement, Reference]:
-    """Return what a law sees, with the measurement's vehicle axis."""
+def observed(built: Assembly, step: TimeStep) -> tuple[Measurement, Any]:
+    """Return what a law receives, with the measurement's vehicle axis."""
     observation = step.observation
-    return (
-        Measurement(*(observation[n][None] for n in Measurement._fields if n in observation)),
-        Reference(*(observation[f"reference_{name}"] for name in Reference._fields)),
-    )
+    none = np.empty((1, 0))
+    measured = {n: observation[n][None] if n in observation else none for n in Measurement._fields}
+    kind = type(built.reference.at(np.zeros(1)))
+    desired = kind(*(observation[f"reference_{name}"] for name in kind._fields))
+    return Measurement(**measured), desired
 
 
-def fly_law(environment: Any, law: Any) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Fly an episode under ``law`` and return the states and the measurements."""
-    step, memory = environment.reset(), None
-    states, measurements = [], []
+def fly_law(environment: Any, built: Assembly) -> list[dict[str, Any]]:
+    """Fly an episode under the scenario's law and return /state and measurement of each period."""
+    step, memory, rows = environment.reset(), None, []
+    physics = environment.physics
     while True:
-        states.append(environment.physics.get_state(INTEGRATION))
-        measurement, reference = seen(step)
-        measurements.append(np.concatenate([m for m in measurement if m.size], axis=1)[0])
+        measurement, reference = observed(built, step)
+        reported = {f"measured_{n}": m[0] for n, m in measurement._asdict().items() if m.size}
+        rows.append({"physics": physics.get_state(INTEGRATION), **physics.memory(), **reported})
         if step.last():
-            return states, measurements
+            return rows
         if memory is None:
-            memory = law.reset(measurement, reference)
-        time = environment.physics.time()
-        memory, command, _ = law.step(memory, time, measurement, reference)
-        step = environment.step(command.torque[0])
+            memory = built.law.reset(measurement, reference)
+        memory, command, _ = built.law.step(memory, physics.time(), measurement, reference)
+        taken = [name for kind in built.actuators.kinds for name in kind.takes]
+        step = environment.step(np.concatenate([getattr(command, n).ravel() for n in taken]))
+
+
+FAILS = [
+    "duration=0.1",
+    "faults=[{motor='wheel_1',kind='dead',at=0.0403},{motor='wheel_0',kind='noisy',value=0.01,at=0}]",
+]
+OUT = ["duration=0.6", "rates.control='0.1 s'", "rates.physics='0.05 s'"]
+CONTROL = "rates.control=0.004"
+AT_ONCE = [f"plant.parts.{side}.deployment.at=0.12" for side in ("east", "west")]
 
 
 @pytest.mark.parametrize(
@@ -160,27 +172,46 @@ def fly_law(environment: Any, law: Any) -> tuple[list[np.ndarray], list[np.ndarr
             ],
         ),
         ("immersion-invariance", ["duration=0.55"]),  # more than a block of references
+        ("rcs-schmitt", ["duration=0.3", "initial.rate=[0.1, 0.2, 0]"]),
+        ("lander", ["duration=0.2"]),
+        ("cmg-slew", ["duration=0.2"]),
+        ("wheel-failure", FAILS),
+        ("gravity-gradient-boom", ["plant.parts.boom.deployment.at=0.25", *OUT]),
+        ("yo-yo-despin", [*AT_ONCE, "duration=0.8", "rates.physics=0.005", "rates.control=0.01"]),
+        ("desaturation-magnetic", ["duration=2"]),
+        (
+            "contraction-ideal",
+            [SHORT, "plant.wheels.speed_limit='30 rad/s'", CONTROL],
+        ),
     ],
-    ids=["ideal", "noisy", "euler", "disturbed", "long"],
+    ids=[
+        *("ideal", "noisy", "euler", "disturbed", "long", "thrusters", "lander", "gimbals"),
+        *("faults", "boom", "yo-yo", "coils", "speed limit"),
+    ],
 )
 def test_the_law_flies_the_same_flight_bit_for_bit(
     scenario: str, overrides: list[str], tmp_path: Path
 ) -> None:
     (tmp_path / "wind.py").write_text(WIND)
     overrides = [text.replace("wind.py", str(tmp_path / "wind.py")) for text in overrides]
+    overrides.append("checks=[]")
     built = assemble(*load(scenario, overrides))
     blocks = list(fly(built, first_start(built, [0])))
-    physics = np.concatenate([block.rows["/state"]["physics"][:, 0] for block in blocks])
-    reports = [block.rows["/measurement"] for block in blocks]
-    logged = [name for name in Measurement._fields if name in reports[0]]
-    measured = np.concatenate(
-        [np.concatenate([report[n][:, 0] for n in logged], 1) for report in reports]
-    )
+    logged = {
+        name: np.concatenate([block.rows["/state"][name][:, 0] for block in blocks])
+        for name in blocks[0].rows["/state"]
+        if not name.startswith("law_")
+    }
+    logged |= {
+        f"measured_{n}": np.concatenate([block.rows["/measurement"][n][:, 0] for block in blocks])
+        for n in blocks[0].rows["/measurement"]
+    }
     environment = environments.load(scenario, overrides)
     for _ in range(2):  # the second episode starts where the first did
-        states, measurements = fly_law(environment, built.law)
-        assert np.array(states).tobytes() == physics.tobytes()
-        assert np.array(measurements).tobytes() == measured.tobytes()
+        rows = fly_law(environment, built)
+        assert rows[0].keys() == logged.keys()
+        for name, values in logged.items():
+            assert np.array([row[name] for row in rows]).tobytes() == values.tobytes(), name
 
 
 def at_rest(*overrides: str) -> Any:
@@ -332,7 +363,7 @@ def test_works_without_any_opengl() -> None:
         "    def find_spec(self, name, *_):\n"
         "        if name == 'OpenGL.platform': raise AttributeError('no glGetError')\n"
         "sys.meta_path.insert(0, Broken())\n"
-        "from mjspace import environments\n"
+        "from mjspace.dm_env import environment as environments\n"
         "from dm_control import _render\n"
         f"environment = environments.load('contraction-ideal', ['{SHORT}'])\n"
         "environment.reset(); environment.step([0.0, 0.0, 0.0])\n"

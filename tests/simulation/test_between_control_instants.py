@@ -11,9 +11,12 @@ import pytest
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import first_start
-from mjspace.simulation.loop import _Flight, fly
+from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Rows, one_vehicle
+from mjspace.simulation.stepper import Stepper
+from mjspace.simulation.user_code import reference_at
 from mjspace.vehicle.model_checks import ModelWarning
 
 LAW = """
@@ -96,13 +99,20 @@ def test_a_rocket_gains_tsiolkovskys_velocity(tmp_path: Path, control: float) ->
 def test_the_model_is_one_of_the_burnt_mass(tmp_path: Path) -> None:
     path = satellite(tmp_path, "[[0, 0, 1]]", RCS)
     built = assemble(*load(path, ["law.on_time=0.95"]))
-    flight = _Flight(built, first_start(built, [0]), [0], 1)
-    flight.record(0, 5, lambda: False)
-    model = flight.batch.get_model(0)
+    stepper = Stepper(built, first_start(built, [0]))
+    law = FlownLaw(built.law, None, 1)
+    for number in range(6):
+        period = stepper.sense(number)
+        desired = reference_at(built.reference, np.array([period.time]))
+        reference = type(desired)(*(rows[0] for rows in desired))
+        _, period.command, period.signals = law.step(period.time, period.measurement, reference)
+        stepper.begin(period)
+        stepper.finish(period)
+    model = stepper.batch.get_model(0)
     fresh = copy.copy(model)
     mujoco.mj_setConst(fresh, mujoco.MjData(fresh))
     tank = model.body("rcs_tank").id
-    left = flight.actuator_state["rcs_propellant"][0, 0]
+    left = stepper.memory["rcs_propellant"][0, 0]
     assert left < 0.99  # of 1 kg
     assert model.body_mass[tank] == pytest.approx(left, rel=2e-5)  # half a step burns 1.2e-5 kg
     for name in ("body_subtreemass", "body_invweight0", "dof_invweight0", "dof_M0"):

@@ -1,0 +1,28 @@
+"""The step effects of a scenario, in the order in which they act."""
+
+from collections.abc import Sequence
+
+from mjspace.simulation.actuator_faults import ActuatorFaults
+from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.burning_mass import BurningMass
+from mjspace.simulation.magnetic_field import MagneticField
+from mjspace.simulation.state_layout import StateLayout
+from mjspace.simulation.user_disturbance import UserDisturbance
+from mjspace.vehicle import deployments, ground_contact
+from mjspace.vehicle.step_effect import StepEffect
+
+
+def effects_of(
+    assembly: Assembly, layout: StateLayout, members: Sequence[int]
+) -> tuple[StepEffect, ...]:
+    """Return new effects, not yet bound to a batch, for these members of the campaign."""
+    scenario, model = assembly.scenario, assembly.vehicle.model
+    every = (
+        ground_contact.of(model, layout.struts, layout.velocity),
+        ActuatorFaults.of(assembly, members),
+        BurningMass.of(assembly.actuators),
+        MagneticField.of(assembly.field),
+        UserDisturbance.of(assembly, layout),
+        deployments.of(model, assembly.qpos, scenario.plant.parts, scenario.rates.physics),
+    )
+    return tuple(effect for effect in every if effect is not None)

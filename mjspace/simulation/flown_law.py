@@ -1,0 +1,81 @@
+"""The law in flight: its state, what it returns, and what it raises."""
+
+from typing import Any
+
+from mjspace.contract import DesiredMotion, Law, Measurement
+from mjspace.errors import FlightError
+from mjspace.simulation.user_code import (
+    check_inner,
+    check_same_shapes,
+    check_state,
+    check_step,
+    check_vehicle_axis,
+    failure,
+    read_only,
+    shapes_of,
+)
+
+
+class FlownLaw:
+    """A law with its state; each step is checked, and its errors are named as the law's."""
+
+    def __init__(self, law: Law, state: Any, vehicles: int) -> None:
+        """Fly ``law`` on so many vehicles, from its ``state``; None: it is reset at the start."""
+        self._law: Any = law
+        self._state = state
+        self._vehicles = vehicles
+        self._first: Any = None
+        self._shapes: list[tuple[int, ...]] | None = None
+
+    def step(
+        self, time: float, measurement: Measurement, reference: DesiredMotion
+    ) -> tuple[Any, Any, Any]:
+        """Return (state before the step, command, signals) at ``time`` [s], read-only.
+
+        Raises:
+            FlightError: the law raised, or returned anything but (state, command, signals) of the
+                same shapes as before.
+        """
+        try:
+            if self._state is None:
+                state = self._law.reset(measurement, reference)
+                check_state(state)
+                self._state = read_only(state or ())
+            before = self._state
+            returned = self._law.step(before, time, measurement, reference)
+        except FlightError:
+            raise
+        except Exception as error:
+            raise failure("the law", error) from error
+        self._check(before, returned)
+        state, command, signals = returned
+        self._state = read_only(state or ())
+        return before, read_only(command), read_only(signals or ())
+
+    def inner(self, time: float, command: Any, measurement: Measurement) -> Any:
+        """Return the motors' command that the inner loop makes of the step's ``command``.
+
+        Raises:
+            FlightError: the inner loop raised, or returned anything but (state, command).
+        """
+        try:
+            returned = self._law.inner(self._state, time, command, measurement)
+        except Exception as error:
+            raise failure("the law's inner loop", error) from error
+        check_inner(returned)
+        self._state = read_only(returned[0] or ())
+        return returned[1]
+
+    def _check(self, before: Any, returned: Any) -> None:
+        """Refuse what the law's step must not return, on its first step or any later one."""
+        names = ("state", "command", "signals")
+        if self._first is None:
+            check_step(returned)
+            for name, part in zip(names, returned, strict=True):
+                check_vehicle_axis(name, part, self._vehicles)
+            self._first = (before, *returned[1:])
+            self._shapes = shapes_of(self._first)
+        if shapes_of(returned) != self._shapes:
+            check_step(returned)
+            for name, part, first in zip(names, returned, self._first, strict=True):
+                check_same_shapes(name, part, first)

@@ -1,0 +1,214 @@
+"""The stepper: one control period of a batch of vehicles, for flights and environments alike."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+
+from mjspace.contract import Array, Measurement
+from mjspace.environment import install
+from mjspace.errors import FlightError, InputError
+from mjspace.simulation import mujoco_warnings
+from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.control_period import ControlPeriod
+from mjspace.simulation.effects import effects_of
+from mjspace.simulation.initial_state import Start
+from mjspace.simulation.state_layout import StateLayout
+from mjspace.simulation.truth import truth_of
+from mjspace.simulation.user_code import failure, sealed
+from mjspace.vehicle.step_effect import Instant
+
+InnerLoop = Callable[[float, Any, Measurement], Any]
+"""Returns the motors' command of an integration step from (time [s], the law's command,
+measurement)."""
+
+_LOCATED = (FlightError, InputError, SimulationError)
+"""Errors that say themselves whose they are."""
+
+
+class Stepper:
+    """A batch of vehicles in motion; each control period is ``sense``, ``begin`` and ``finish``."""
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        start: Start,
+        members: Sequence[int] = (0,),
+        *,
+        threads: int = 1,
+        inner: InnerLoop | None = None,
+    ) -> None:
+        """Put the ``members`` of the campaign at ``start``; ``inner`` is the law's inner loop."""
+        mujoco_warnings.silence()
+        install.install()
+        self.batch = Batch(assembly.vehicle.model, len(members), threads)
+        self.batch.state[:] = start.physics
+        for name, values in start.model.items():
+            self.batch.expand(name)[:] = values
+        if start.model:
+            self.batch.set_const()
+        self._sensordata = self.batch.bind("sensordata")
+        self.layout = StateLayout(assembly)
+        self._suite, self._sensors = assembly.sensors(members), start.sensors
+        self.memory = start.actuators
+        self._actuators, self._inner, self._hold = assembly.actuators, inner, assembly.hold
+        self._inputs = self._actuators.inputs(self.batch, assembly.vehicle.motors)
+        self.effects = effects_of(assembly, self.layout, members)
+        for effect in self.effects:
+            effect.bind(self.batch)
+        rates = assembly.scenario.rates
+        self._steps, self._control, self._physics = rates.steps, rates.control, rates.physics
+        self._tick = math.gcd(self._steps, *self._suite.ticks)
+        self._driven = assembly.driven_stepwise
+        self._stepwise = self._driven or any(effect.every_step for effect in self.effects)
+        self._always_senses = inner is not None or any(e.needs_truth for e in self.effects)
+
+    def sense(self, number: int) -> ControlPeriod:
+        """Return the control period of that number at its control instant, without a command."""
+        period = ControlPeriod()
+        period.number, period.time = number, number * self._control
+        period.physics = physics = self._copy_of_state()
+        period.events, period.sensors = [], self._sensors
+        if self.effects:
+            self._each_effect("observe", physics, period.time, period.events)
+        period.memory, period.truth = self.memory, self._truth(physics)
+        period.measurement = self._measure(number * self._steps, period.truth)
+        return period
+
+    def begin(self, period: ControlPeriod, *, flown: bool = True) -> None:
+        """Fly the first integration step of a sensed ``period`` that has a command and signals.
+
+        If not ``flown``, as at the end of a flight, MuJoCo only computes what holds now.
+
+        Raises:
+            FlightError: the command lacks what the actuators need, or a part raised an error.
+            InputError: a fault's signal is not known.
+            mujoco.batch.SimulationError: MuJoCo raised an error.
+        """
+        instant = None
+        if self.effects:
+            instant = Instant(
+                period.time,
+                period.physics,
+                period.truth,
+                period.measurement,
+                period.command,
+                period.signals,
+                period.memory,
+                period.events,
+            )
+            self._each_effect("at_control", instant)
+        period.applied, period.saturated = self._drive(
+            period.time, period.command, period.measurement, period.truth, instant
+        )
+        if self.effects:
+            self._each_effect("before_step", instant)
+        # Derived fields lag the state by one step: this step computes those of now.
+        if flown:
+            self.batch.step()
+        else:
+            self.batch.forward()
+        period.wrench, period.sensordata = self._wrench(), self._sensordata.copy()
+        if flown and self.effects:
+            self._each_effect("after_step", instant)
+
+    def finish(self, period: ControlPeriod) -> None:
+        """Integrate the rest of the ``period``, with the samples due in between.
+
+        Raises:
+            FlightError, mujoco.batch.SimulationError: as ``begin``.
+        """
+        step = 1
+        while step < self._steps:
+            due = self._always_senses or step % self._tick == 0
+            if self._stepwise or due:
+                instant = self._between(period, step, due=due)
+            if self._stepwise:
+                if self._driven:
+                    now, _, truth, measurement, *_ = instant
+                    _, saturated = self._drive(now, period.command, measurement, truth, instant)
+                    np.maximum(period.saturated, saturated, out=period.saturated)
+                self._each_effect("before_step", instant)
+                self.batch.step()
+                self._each_effect("after_step", instant)
+                step += 1
+            else:
+                count = self._tick - step % self._tick
+                self.batch.step(nstep=count)
+                step += count
+
+    def _between(self, period: ControlPeriod, step: int, *, due: bool) -> Instant:
+        """Return the instant between control instants at which that step of the period begins."""
+        number = period.number * self._steps + step
+        physics = self._copy_of_state()
+        if due:
+            truth = self._truth(physics)
+            measurement = self._measure(number, truth)
+        else:
+            truth = measurement = self.layout.motion(physics)
+        now = number * self._physics
+        return Instant(now, physics, truth, measurement, None, None, self.memory, period.events)
+
+    def _copy_of_state(self) -> Array:
+        """Return a copy of the state rows; views of it make the truth, and nobody may write."""
+        physics: Array = self.batch.state.copy()
+        physics.setflags(write=False)
+        return physics
+
+    def _truth(self, physics: Array) -> Measurement:
+        return sealed(truth_of(physics, self.memory, self.layout, self._actuators, self.effects))
+
+    def _measure(self, step: int, truth: Measurement) -> Measurement:
+        self._sensors, measurement = self._suite.sample(self._sensors, step, truth)
+        return measurement if measurement is truth else sealed(measurement)
+
+    def _drive(
+        self,
+        now: float,
+        command: Any,
+        measurement: Measurement,
+        truth: Measurement,
+        instant: Any,
+    ) -> tuple[tuple[Array, ...], Array]:
+        """Let the actuators act on the command; return what they apply, and which saturate."""
+        if self._inner is not None:
+            command = self._inner(now, command, measurement)
+        try:
+            memory, applied, saturated = self._actuators.act(
+                self.memory, command, truth, self._hold
+            )
+        except _LOCATED:
+            raise
+        except Exception as error:
+            raise failure("an actuator", error) from error
+        for effect in self.effects:
+            try:
+                memory, applied = effect.change(memory, applied, instant)
+            except _LOCATED:
+                raise
+            except Exception as error:
+                raise failure(effect.name, error) from error
+        self.memory = memory
+        for view, values in zip(self._inputs, applied, strict=True):
+            view[:] = values
+        return applied, saturated
+
+    def _each_effect(self, hook: str, *arguments: Any) -> None:
+        """Call the ``hook`` of ``StepEffect`` that changes the memory alone on each effect."""
+        for effect in self.effects:
+            try:
+                self.memory = getattr(effect, hook)(self.memory, *arguments)
+            except _LOCATED:
+                raise
+            except Exception as error:
+                raise failure(effect.name, error) from error
+
+    def _wrench(self) -> Array | None:
+        """Return the sum of what the step effects apply to the bus; None where none does."""
+        total = None
+        for effect in self.effects:
+            if effect.wrench is not None:
+                total = effect.wrench if total is None else total + effect.wrench
+        return total

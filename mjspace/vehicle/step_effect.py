@@ -1,0 +1,102 @@
+"""Step effects: what acts on the vehicles in flight besides the law's command to the actuators."""
+
+from abc import ABC
+from typing import Any, ClassVar, NamedTuple
+
+from mjspace.contract import Array, Event, Measurement
+
+State = dict[str, Array]
+"""Named arrays that are remembered from step to step, vehicle axis first."""
+
+
+class Instant(NamedTuple):
+    """The beginning of an integration step, as every effect receives it; arrays are read-only."""
+
+    time: float
+    """Simulation time [s]."""
+    physics: Array
+    """MuJoCo's integration state, (N, nstate)."""
+    truth: Measurement
+    """Between control instants only attitude, rate, wheels and gimbals, unless an effect of the
+    flight ``needs_truth``; fields (N, ...)."""
+    measurement: Measurement
+    """The sensors' latest report; between control instants, where none is due, the truth."""
+    command: Any
+    """The law's command, a named tuple; None between control instants."""
+    signals: Any
+    """The law's signals, a named tuple, which may be empty; None between control instants."""
+    memory: State
+    """What actuators and effects remembered before the actuators acted."""
+    events: list[Event]
+    """What has happened in this control period; an effect appends what it reports."""
+
+    @property
+    def is_control(self) -> bool:
+        """Whether it is a control instant: the law has just stepped."""
+        return self.command is not None
+
+
+class StepEffect(ABC):
+    """Base of an effect on a batch of vehicles: override what it does, the rest does nothing.
+
+    ``memory`` is what the actuators and all effects remember. An effect returns it with changes to
+    its own names, never changed in place; what it holds is logged in /state, under
+    ``actuator_<name>``, and a replay starts from it. An effect remembers nothing elsewhere.
+
+    In a control period the order is: ``observe``; the sensors and the law; ``at_control``; then for
+    each integration step the actuators, ``change``, ``before_step``, MuJoCo, ``after_step``.
+    """
+
+    name: ClassVar[str]
+    """As error messages name it, with its article: "the disturbance"."""
+    every_step: ClassVar[bool] = False
+    """Whether it acts in every integration step; else only in the first of a control period."""
+    needs_truth: ClassVar[bool] = False
+    """Whether it needs the whole truth in every integration step, and not turning alone."""
+    wrench: Array | None = None
+    """Force [N], inertial axes, and torque [N m], body axes, that it applies to the bus in the step
+    that ``before_step`` has prepared, (N, 6): added to /disturbance; None for none."""
+
+    def bind(self, batch: Any) -> None:  # noqa: B027
+        """Take from the flight's ``mujoco.batch.Batch`` what is needed to act on it."""
+
+    def reset(self, physics: Array) -> State:
+        """Return what it remembers at the start of a flight, at ``physics`` (N, nstate)."""
+        return {}
+
+    def observe(self, memory: State, physics: Array, time: float, events: list[Event]) -> State:
+        """Return the memory at a control instant, before the truth is computed from it."""
+        return memory
+
+    def add_to_truth(self, memory: State, truth: Measurement) -> Measurement:
+        """Return the truth with what it adds; arrays may have a period axis before the vehicles'.
+
+        ``truth`` fields and ``memory`` are (N, ...), or (n, N, ...) for the rows of a log.
+        """
+        return truth
+
+    def at_control(self, memory: State, instant: Instant) -> State:
+        """Return the memory at a control instant, after the law and before the actuators."""
+        return memory
+
+    def change(
+        self, memory: State, applied: tuple[Array, ...], instant: Instant
+    ) -> tuple[State, tuple[Array, ...]]:
+        """Return (memory, what the actuators apply instead of ``applied``), whenever they act."""
+        return memory, applied
+
+    def before_step(self, memory: State, instant: Instant) -> State:
+        """Act on the batch for the integration step that begins; return the memory."""
+        return memory
+
+    def after_step(self, memory: State, instant: Instant) -> State:
+        """Return the memory after the step that began at ``instant``.
+
+        MuJoCo's derived fields, such as ``sensordata``, describe ``instant`` then, and the batch's
+        state the end of the step.
+        """
+        return memory
+
+    def logged(self, memory: State, sensordata: Array) -> dict[str, Array]:
+        """Return fields of /truth that it adds to the log, (n, N, k), from rows of a flight."""
+        return {}
