@@ -49,7 +49,7 @@ LOG = (
     "log/test_log_cut.py",
     "log/test_log_digest.py",
 )
-VALIDATION = ("validation/test_suite.py", "validation/test_report.py", "validation/test_command.py")
+VALIDATION = ("validation/test_suite.py", "validation/test_report.py", "cli/test_validate.py")
 GUARDS = {
     "mjspace/log/chunk.py": LOG,
     "mjspace/log/digest.py": LOG,

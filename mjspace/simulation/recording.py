@@ -1,7 +1,7 @@
 """What a flight records: a list entry for each control period, turned into rows block by block."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mujoco
@@ -24,6 +24,8 @@ class Block:
     time: Array
     rows: Rows
     events: list[Event]
+    kinds: dict[str, type] = field(default_factory=dict)
+    """The named tuple that was recorded on a topic, of those that users' code returns."""
 
 
 def one_vehicle(block: Block, vehicle: int = 0) -> Rows:
@@ -57,7 +59,7 @@ def until_trouble(block: Block, columns: StateLayout) -> tuple[Block, str]:
     problem = f"{culprit} is not finite, or beyond 1e10, at t = {block.time[first]:.6g} s"
     rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
     events = [event for event in block.events if event.time < block.time[first]]
-    return Block(block.period, block.time[:first], rows, events), problem
+    return replace(block, time=block.time[:first], rows=rows, events=events), problem
 
 
 @dataclass
@@ -142,7 +144,13 @@ class Recording:
         # Also those within the last period; a period that could not be recorded has none.
         end = time[-1] + control - TICK
         events += [event for event in self.happened if event.time < end]
-        return Block(self.period, time, {t: f for t, f in rows.items() if f}, events)
+        kinds = {
+            "/state": type(self.law[0]),
+            "/reference": type(self.reference),
+            "/command": type(self.command[0]),
+            "/law": type(self.signals[0]),
+        }
+        return Block(self.period, time, {t: f for t, f in rows.items() if f}, events, kinds)
 
 
 def _about_the_place(
