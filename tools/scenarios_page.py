@@ -13,17 +13,19 @@ from mjspace.scenario.loading import load, scenario_names
 PAGE = Path(__file__).parents[1] / "docs/scenarios.md"
 HEAD = """# What flies
 
-The scenarios that come with mjspace, grouped by the subject of their law. Each ends in a verdict: where a paper's
-claim does not hold on the multibody plant, the checks state what does. This page is written by
-`python tools/scenarios_page.py` from the scenarios.
+The scenarios that come with mjspace, grouped by the subject of their law. Each ends in a verdict:
+where a paper's claim does not hold on the multibody plant, the checks state what does. This page is
+written by `python tools/scenarios_page.py` from the scenarios.
 
 ```console
 $ mjspace list
 $ mjspace run detumble-wheels --duration 2 --set checks=[] --out detumble
 ```
 
-`mjspace info NAME` shows one with every default written out, and [its keys](scenario.md) can each be set on the
-command line. Every law and reference is listed with its gains [there](scenario.md#laws-and-references-that-come-with-mjspace).
+`mjspace info NAME` shows one with every default written out; [each key](scenario.md) can be set on
+the command line. Laws and references are listed [with their gains][laws].
+
+[laws]: scenario.md#laws-and-references-that-come-with-mjspace
 """
 
 

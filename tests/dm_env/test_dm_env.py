@@ -17,8 +17,8 @@ pytest.importorskip("dm_control")
 
 from dm_env import StepType, TimeStep, test_utils
 
+from mjspace import dm_env
 from mjspace.contract import Measurement, Reference
-from mjspace.dm_env import environment as environments
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load, scenario_names
 from mjspace.simulation.assembly import assemble
@@ -66,7 +66,7 @@ class _Conformance(test_utils.EnvironmentTestMixin):
     overrides: Sequence[str] = ()
 
     def make_object_under_test(self) -> Any:
-        return environments.load(self.scenario, [SHORT, *self.overrides])
+        return dm_env.load(self.scenario, [SHORT, *self.overrides])
 
     def make_action_sequence(self) -> Iterator[np.ndarray]:
         spec = self.environment.action_spec()
@@ -98,7 +98,7 @@ class TestDivergence(_Conformance, TestCase):
 
 @pytest.mark.parametrize("scenario", [name for name in scenario_names() if wheeled(name)])
 def test_every_scenario_with_reaction_wheels_is_an_environment(scenario: str) -> None:
-    environment = environments.load(scenario)
+    environment = dm_env.load(scenario)
     environment.reset()
     step = environment.step(np.zeros(3))
     assert step.mid()
@@ -108,13 +108,13 @@ def test_every_scenario_with_reaction_wheels_is_an_environment(scenario: str) ->
 @pytest.mark.parametrize("scenario", ["wheel-failure", "mission"])
 def test_what_goes_wrong_or_out_makes_no_environment(scenario: str) -> None:
     with pytest.raises(InputError, match="faults and deployments: an environment has none"):
-        environments.load(scenario)
+        dm_env.load(scenario)
 
 
 @pytest.mark.parametrize("scenario", ["dgvscmg-tracking", "pd-plus"])
 def test_other_motors_make_no_environment(scenario: str) -> None:
     with pytest.raises(InputError, match="a torque for reaction wheels"):
-        environments.load(scenario)
+        dm_env.load(scenario)
 
 
 def seen(step: TimeStep) -> tuple[Measurement, Reference]:
@@ -176,7 +176,7 @@ def test_the_law_flies_the_same_flight_bit_for_bit(
     measured = np.concatenate(
         [np.concatenate([report[n][:, 0] for n in logged], 1) for report in reports]
     )
-    environment = environments.load(scenario, overrides)
+    environment = dm_env.load(scenario, overrides)
     for _ in range(2):  # the second episode starts where the first did
         states, measurements = fly_law(environment, built.law)
         assert np.array(states).tobytes() == physics.tobytes()
@@ -185,7 +185,7 @@ def test_the_law_flies_the_same_flight_bit_for_bit(
 
 def at_rest(*overrides: str) -> Any:
     """Return a spacecraft at rest, 2 deg from the attitude that it is to hold."""
-    return environments.load(
+    return dm_env.load(
         "contraction-regulation",
         [
             SHORT,
@@ -263,7 +263,7 @@ def test_readings_are_of_the_instant_of_the_state() -> None:
 
 
 def test_an_observation_is_the_agents_own() -> None:
-    environment = environments.load("contraction-noise", [SHORT, *NOISY])
+    environment = dm_env.load("contraction-noise", [SHORT, *NOISY])
     first = environment.reset().observation
     kept = {name: values.copy() for name, values in first.items()}
     environment.step(np.ones(3))
@@ -275,7 +275,7 @@ def test_an_observation_is_the_agents_own() -> None:
 
 
 def test_an_episode_ends_with_the_scenario() -> None:
-    environment = environments.load("contraction-adaptive", ["duration=0.3", "rates.control=0.1"])
+    environment = dm_env.load("contraction-adaptive", ["duration=0.3", "rates.control=0.1"])
     environment.reset()
     steps = [environment.step(np.zeros(3)) for _ in range(4)]
     assert [step.step_type for step in steps] == [
@@ -290,7 +290,7 @@ def test_an_episode_ends_with_the_scenario() -> None:
 
 @pytest.mark.parametrize("action", [np.nan, np.inf, 1e300, 1e11])
 def test_an_episode_ends_where_the_state_is_not_finite(action: float) -> None:
-    environment = environments.load("contraction-adaptive", [SHORT])
+    environment = dm_env.load("contraction-adaptive", [SHORT])
     start = environment.reset()
     for _ in range(3):
         step = environment.step(np.full(3, action))
@@ -332,9 +332,9 @@ def test_works_without_any_opengl() -> None:
         "    def find_spec(self, name, *_):\n"
         "        if name == 'OpenGL.platform': raise AttributeError('no glGetError')\n"
         "sys.meta_path.insert(0, Broken())\n"
-        "from mjspace import environments\n"
+        "from mjspace import dm_env\n"
         "from dm_control import _render\n"
-        f"environment = environments.load('contraction-ideal', ['{SHORT}'])\n"
+        f"environment = dm_env.load('contraction-ideal', ['{SHORT}'])\n"
         "environment.reset(); environment.step([0.0, 0.0, 0.0])\n"
         "print(_render.BACKEND, os.environ.get('MUJOCO_GL'))"
     )

@@ -112,10 +112,10 @@ def test_an_event_after_the_last_period_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     with create(path) as log:
         write_block(log, 0, 10)
-        log.event(0.009, 0, "INFO", "flushed")
+        log.event(0.009, "INFO", "flushed")
         log.flush()
         assert Log(path).events()[-1] == (0.009, 0, "INFO", "flushed")
-        log.event(0.009, 0, "ERROR", "closed")
+        log.event(0.009, "ERROR", "closed")
     assert Log(path).events()[-1] == (0.009, 0, "ERROR", "closed")
     assert len(Log(path)) == 10
 

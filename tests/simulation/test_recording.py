@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mjspace.attitude import from_euler_zyx, rotate
-from mjspace.contract import Array
+from mjspace.contract import Array, Event
 from mjspace.errors import FlightError
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import assemble
@@ -106,7 +106,7 @@ def block(**changes: Array) -> Block:
         "/command": {"torque": changes.get("torque", GOOD)},
         "/law": {"p": changes.get("law", GOOD)},
     }
-    events = [(0.1 * k, 0, "INFO", str(k)) for k in range(4)]
+    events = [Event(0.1 * k, 0, "INFO", str(k)) for k in range(4)]
     return Block(7, 0.1 * np.arange(4), rows, events)
 
 
