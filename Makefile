@@ -1,7 +1,7 @@
 # The set-up happens by itself, once, and again when what it reads changes.
 bin := .venv/bin
 
-.PHONY: run test flights mutation lint format validation constraints clean
+.PHONY: run test flights mutation lint format docs validation constraints clean
 
 run: .venv/run.done
 	$(bin)/mjspace run contraction-adaptive --plot --video
@@ -25,6 +25,10 @@ lint: .venv/dev.done
 format: .venv/dev.done
 	$(bin)/ruff check --fix
 	$(bin)/ruff format
+
+# The documentation site, in build/site; any warning, such as a broken link, is an error.
+docs: .venv/dev.done
+	NO_MKDOCS_2_WARNING=1 $(bin)/mkdocs build -q --strict
 
 # What docs/validation.md says, measured again; Basilisk and its packages live apart from ours.
 validation: .venv/dev.done build/basilisk.done

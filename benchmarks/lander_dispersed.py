@@ -15,7 +15,7 @@ from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start
 from mjspace.simulation.loop import fly
-from mjspace.terminal.terminal import progress_bar
+from mjspace.terminal.reporting import progress_bar
 
 FIELDS = ("body_mass", "body_ipos", "body_inertia", "body_iquat")
 # Ten times as quick as RK4 at 2 ms, and lands alike, to 8 mm/s and 0.9 mm

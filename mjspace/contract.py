@@ -1,12 +1,13 @@
 """What passes between a vehicle, its sensors, a reference and a control law."""
 
 from dataclasses import MISSING, field, fields
-from typing import Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjspace.ranges import Form, Range, refuse_unfit
+from mjspace.units import Unit as Unit
 
 Array = NDArray[np.float64]
 
@@ -23,38 +24,38 @@ class Measurement(NamedTuple):
 
     attitude: Array
     """Quaternion, scalar first, body to inertial, shape (..., 4)."""
-    rate: Array
+    rate: Annotated[Array, Unit("rad/s")]
     """Angular velocity relative to inertial, body axes [rad/s], shape (..., 3)."""
-    wheel_speed: Array
+    wheel_speed: Annotated[Array, Unit("rad/s", display="rpm")]
     """Wheel speeds relative to what carries them [rad/s], shape (..., n)."""
-    gimbal_angle: Array = np.zeros(0)
+    gimbal_angle: Annotated[Array, Unit("rad")] = np.zeros(0)
     """Gimbal angles, the outer before the inner [rad], shape (..., g)."""
-    gimbal_rate: Array = np.zeros(0)
+    gimbal_rate: Annotated[Array, Unit("rad/s")] = np.zeros(0)
     """Gimbal rates relative to what carries them [rad/s], shape (..., g)."""
-    current: Array = np.zeros(0)
+    current: Annotated[Array, Unit("A")] = np.zeros(0)
     """(I_d, I_q) of each motor that has an electrical side [A], shape (..., m, 2); its windings'
     currents where the drive works in the stator's axes."""
-    position: Array = np.zeros(0)
+    position: Annotated[Array, Unit("m")] = np.zeros(0)
     """Of the bus, inertial axes [m], shape (..., 3)."""
-    velocity: Array = np.zeros(0)
+    velocity: Annotated[Array, Unit("m/s")] = np.zeros(0)
     """Of the bus, inertial axes [m/s], shape (..., 3)."""
-    specific_force: Array = np.zeros(0)
+    specific_force: Annotated[Array, Unit("m/s^2")] = np.zeros(0)
     """What an accelerometer at the bus's origin feels, body axes [m/s^2], shape (..., 3): the mean
     since its last sample."""
-    altitude: Array = np.zeros(0)
+    altitude: Annotated[Array, Unit("m")] = np.zeros(0)
     """Height of the bus above the plane z = 0 [m], shape (..., 1)."""
-    ground_velocity: Array = np.zeros(0)
+    ground_velocity: Annotated[Array, Unit("m/s")] = np.zeros(0)
     """What a velocimeter shows: of the bus, body axes [m/s], shape (..., 3)."""
-    thrust: Array = np.zeros(0)
+    thrust: Annotated[Array, Unit("N")] = np.zeros(0)
     """Of the engine, then of each thruster [N], shape (..., n)."""
-    propellant: Array = np.zeros(0)
+    propellant: Annotated[Array, Unit("kg")] = np.zeros(0)
     """Left in the tank, the engine's before the thrusters' [kg], shape (..., n)."""
     contact: Array = np.zeros(0)
     """1.0 while at least two feet or the hull touch the ground, else 0.0, shape (..., 1)."""
-    wheel_angle: Array = np.zeros(0)
+    wheel_angle: Annotated[Array, Unit("rad")] = np.zeros(0)
     """Angles of the wheels with an electrical side, relative to what carries them [rad], shape
     (..., n)."""
-    magnetic_field: Array = np.zeros(0)
+    magnetic_field: Annotated[Array, Unit("T")] = np.zeros(0)
     """Of the Earth, body axes [T], shape (..., 3)."""
     foot_contact: Array = np.zeros(0)
     """1.0 for each foot that touches the ground, else 0.0, shape (..., f)."""
@@ -70,25 +71,25 @@ class Truth(NamedTuple):
     """
 
     attitude: Array
-    rate: Array
-    wheel_speed: Array
-    gimbal_angle: Array
-    gimbal_rate: Array
-    current: Array
-    position: Array
-    velocity: Array
-    altitude: Array
-    ground_velocity: Array
-    thrust: Array
-    propellant: Array
+    rate: Annotated[Array, Unit("rad/s")]
+    wheel_speed: Annotated[Array, Unit("rad/s", display="rpm")]
+    gimbal_angle: Annotated[Array, Unit("rad")]
+    gimbal_rate: Annotated[Array, Unit("rad/s")]
+    current: Annotated[Array, Unit("A")]
+    position: Annotated[Array, Unit("m")]
+    velocity: Annotated[Array, Unit("m/s")]
+    altitude: Annotated[Array, Unit("m")]
+    ground_velocity: Annotated[Array, Unit("m/s")]
+    thrust: Annotated[Array, Unit("N")]
+    propellant: Annotated[Array, Unit("kg")]
     contact: Array
-    wheel_angle: Array
-    magnetic_field: Array
+    wheel_angle: Annotated[Array, Unit("rad")]
+    magnetic_field: Annotated[Array, Unit("T")]
     foot_contact: Array
     hull_contact: Array
-    orbit_position: Array
+    orbit_position: Annotated[Array, Unit("m")]
     """Of the frame's origin from the planet's centre, inertial axes [m], shape (3,)."""
-    orbit_velocity: Array
+    orbit_velocity: Annotated[Array, Unit("m/s")]
     """Of the frame's origin, inertial axes [m/s], shape (3,)."""
 
 
@@ -97,9 +98,9 @@ class Reference(NamedTuple):
 
     attitude: Array
     """Quaternion, scalar first, desired body axes to inertial, shape (..., 4)."""
-    rate: Array
+    rate: Annotated[Array, Unit("rad/s")]
     """Angular velocity of the desired axes, in the desired axes [rad/s], shape (..., 3)."""
-    acceleration: Array
+    acceleration: Annotated[Array, Unit("rad/s^2")]
     """Time derivative of the components of ``rate`` [rad/s^2], shape (..., 3)."""
 
 
@@ -108,15 +109,15 @@ class Trajectory(NamedTuple):
 
     attitude: Array
     """Quaternion, scalar first, desired body axes to inertial, shape (..., 4)."""
-    rate: Array
+    rate: Annotated[Array, Unit("rad/s")]
     """Angular velocity of the desired axes, in the desired axes [rad/s], shape (..., 3)."""
-    acceleration: Array
+    acceleration: Annotated[Array, Unit("rad/s^2")]
     """Time derivative of the components of ``rate`` [rad/s^2], shape (..., 3)."""
-    position: Array
+    position: Annotated[Array, Unit("m")]
     """Inertial axes [m], shape (..., 3)."""
-    velocity: Array
+    velocity: Annotated[Array, Unit("m/s")]
     """Inertial axes [m/s], shape (..., 3)."""
-    linear_acceleration: Array
+    linear_acceleration: Annotated[Array, Unit("m/s^2")]
     """Inertial axes [m/s^2], shape (..., 3)."""
 
 
@@ -139,14 +140,14 @@ class Event(NamedTuple):
 class TorqueCommand(NamedTuple):
     """What a law asks of the reaction wheels."""
 
-    torque: Array
+    torque: Annotated[Array, Unit("N m")]
     """On the bus, body axes [N m], shape (..., 3)."""
 
 
 class VoltageCommand(NamedTuple):
     """What an inner loop asks of the motors' inverters."""
 
-    voltage: Array
+    voltage: Annotated[Array, Unit("V")]
     """(u_d, u_q) of each motor, in the rotor's axes [V], shape (..., m, 2); in the stator's, the
     two windings', where the drive works in those."""
 
@@ -154,23 +155,23 @@ class VoltageCommand(NamedTuple):
 class GimbalRateCommand(NamedTuple):
     """What a law asks of gimbals that have speed loops of their own."""
 
-    gimbal_rate: Array
+    gimbal_rate: Annotated[Array, Unit("rad/s")]
     """Relative to what carries each [rad/s], shape (..., g)."""
 
 
 class ThrustCommand(NamedTuple):
     """What a law asks of an engine on two gimbals."""
 
-    thrust: Array
+    thrust: Annotated[Array, Unit("N")]
     """[N], shape (..., 1)."""
-    gimbal: Array
+    gimbal: Annotated[Array, Unit("rad")]
     """Angles of the hinges, the outer before the inner [rad], shape (..., 2)."""
 
 
 class PulseCommand(NamedTuple):
     """What a law asks of on/off thrusters."""
 
-    on_time: Array
+    on_time: Annotated[Array, Unit("s")]
     """For how long each is on, from the beginning of the control period [s], shape (..., n); of the
     integration step, where an inner loop commands it."""
 

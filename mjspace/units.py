@@ -1,7 +1,8 @@
-"""Numbers with units: what a scenario writes as ``"0.1 deg"`` becomes SI once, when it is read."""
+"""Units: conversion of ``"0.1 deg"`` to SI, the unit beside a field, and the unit on a plot."""
 
 import math
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, get_type_hints
 
 _DEG = math.pi / 180.0
 _RPM = 2.0 * math.pi / 60.0
@@ -32,6 +33,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "km": ("m", 1e3),
     "m/s": ("m/s", 1.0),
     "km/s": ("m/s", 1e3),
+    "m/s^2": ("m/s^2", 1.0),
     "kg": ("kg", 1.0),
     "g": ("kg", 1e-3),
     "kg m": ("kg m", 1.0),
@@ -62,6 +64,45 @@ UNITS: dict[str, tuple[str, float]] = {
     "V s/rad": ("N m/A", 1.0),
 }
 
+_DISPLAYED_IN = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The SI unit of a field, declared in its annotation.
+
+    ``rate: Annotated[Array, Unit("rad/s")]`` in a named tuple of the contract or of a law: the log
+    stores it beside the field, and plots, pages and ``mjspace info`` read it from there.
+    """
+
+    si: str
+    """As in ``UNITS``, or any other text where no quantity string is converted to it."""
+    display: str = ""
+    """For plots; if left out, degrees for radians and otherwise the SI unit."""
+
+    @property
+    def displayed(self) -> tuple[str, float]:
+        """The unit of a plot, and the factor from SI to it."""
+        name = self.display or _DISPLAYED_IN.get(self.si, self.si)
+        return name, (1.0 if name == self.si else 1.0 / UNITS[name][1])
+
+
+def units_of(kind: type) -> dict[str, Unit]:
+    """Return the units that the fields of the class ``kind`` declare, by field.
+
+    A field without ``Unit`` in its annotation is absent; so are all of a class whose annotations
+    are text that cannot be evaluated, as of a class inside a function.
+    """
+    try:
+        hints = get_type_hints(kind, include_extras=True)
+    except NameError:
+        return {}
+    found = {
+        name: [each for each in getattr(hint, "__metadata__", ()) if isinstance(each, Unit)]
+        for name, hint in hints.items()
+    }
+    return {name: units[0] for name, units in found.items() if units}
+
 
 def to_si(value: Any, unit: str) -> Any:
     """Return ``value`` with every quantity string in it converted to the SI unit ``unit``.
@@ -76,16 +117,17 @@ def to_si(value: Any, unit: str) -> Any:
         return [to_si(item, unit) for item in value]
     if not isinstance(value, str):
         return value
-    right = [name for name, (si, _) in UNITS.items() if si == unit]
-    magnitude, written = _split(value)
-    if not right:
+    if not unit:
         raise ValueError(f"got the text {value!r}, should be a plain number")
+    magnitude, written = _split(value)
+    right = [name for name, (si, _) in UNITS.items() if si == unit] or [unit]
+    which = f"one of {', '.join(right)}" if len(right) > 1 else unit
     if not written:
-        raise ValueError(
-            f"{value!r} has no unit: write a plain number for {unit}, or one of {', '.join(right)}"
-        )
+        raise ValueError(f"{value!r} has no unit: write a plain number for {unit}, or {which}")
     if written not in right:
-        raise ValueError(f"{value!r} has the unit {written!r}, should be one of {', '.join(right)}")
+        raise ValueError(f"{value!r} has the unit {written!r}, should be {which}")
+    if written == unit:
+        return magnitude
     return magnitude * UNITS[written][1]
 
 

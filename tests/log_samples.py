@@ -15,13 +15,14 @@ from mjspace.contract import Array
 from mjspace.log.encoding import Fields
 from mjspace.log.schema import Scene
 from mjspace.log.writer import LogWriter
+from mjspace.units import Unit
 
 TOPICS: dict[str, Fields] = {
     "/state": {"physics": (9,), "law_p": (2, 3), "sensor_none": (0,)},
     "/truth": {"attitude": (4,), "rate": (3,), "attitude_error": ()},
     "/law": {},
 }
-UNITS = {"/truth": {"attitude_error": "rad"}}
+UNITS = {"/truth": {"attitude_error": Unit("rad")}}
 METADATA = {"seed": "7", "integrator": "RK4", "note": "Grüße"}
 ATTACHMENTS = {
     "scenario.toml": ("application/toml", b"duration = 1.0\n"),

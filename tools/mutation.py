@@ -49,7 +49,7 @@ LOG = (
     "log/test_log_cut.py",
     "log/test_log_digest.py",
 )
-VALIDATION = ("validation/test_suite.py", "validation/test_report.py", "validation/test_command.py")
+VALIDATION = ("validation/test_suite.py", "validation/test_report.py", "cli/test_validate.py")
 GUARDS = {
     "mjspace/log/chunk.py": LOG,
     "mjspace/log/digest.py": LOG,
@@ -441,13 +441,8 @@ def import_all() -> None:
     """Import what the tests will need, so that each fork has it."""
     for path in sorted([*ROOT.glob("mjspace/**/*.py"), *ROOT.glob("controllers/**/*.py")]):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-        if path.stem not in (
-            "__init__",
-            "__main__",
-            "basilisk_flight",
-            "dm_bridge",
-            "environments",
-        ):
+        unwanted = path.stem in ("__init__", "__main__", "basilisk_flight")
+        if not unwanted and path.parent.name != "dm_env":  # which takes a second, and MuJoCo's log
             importlib.import_module(name if name.startswith("mjspace") else f"mjspace.{name}")
 
 

@@ -11,11 +11,11 @@ arrays may have leading vehicle axes.
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Gains, Measurement, Reference, VoltageCommand, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, Unit, VoltageCommand, gain
 
 from ..attitude import pd_plus
 from ..motors import motor_loops
@@ -36,11 +36,11 @@ class State(NamedTuple):
 class SpeedCommand(NamedTuple):
     """What the attitude loop asks of the motors' loops, for its period."""
 
-    gimbal_rate: Array
+    gimbal_rate: Annotated[Array, Unit("rad/s")]
     """[rad/s], outer and inner, (..., 2)."""
-    acceleration: Array
+    acceleration: Annotated[Array, Unit("rad/s^2")]
     """Of each hinge [rad/s^2], (..., 3); the gimbals' is left at zero, the wheel's is wanted."""
-    load: Array
+    load: Annotated[Array, Unit("N m")]
     """Gyroscopic torque that each motor is to hold [N m], (..., 3); none on the wheel's."""
 
 

@@ -7,11 +7,11 @@ rates by nothing, and the bus feels neither.
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, gain
+from mjspace.contract import Array, Measurement, Reference, Unit, gain
 
 from . import dgvscmg, steering
 
@@ -19,20 +19,20 @@ from . import dgvscmg, steering
 class Command(NamedTuple):
     """What the attitude loop asks of the motors' loops and the thrusters, for its period."""
 
-    gimbal_rate: Array
-    acceleration: Array
-    load: Array
+    gimbal_rate: Annotated[Array, Unit("rad/s")]
+    acceleration: Annotated[Array, Unit("rad/s^2")]
+    load: Annotated[Array, Unit("N m")]
     """These three as ``dgvscmg.SpeedCommand`` has them."""
-    thruster_torque: Array
+    thruster_torque: Annotated[Array, Unit("N m")]
     """On the bus, body axes [N m], (..., 3)."""
 
 
 class MotorCommand(NamedTuple):
     """What the inner loop asks of inverters and thrusters."""
 
-    voltage: Array
+    voltage: Annotated[Array, Unit("V")]
     """As ``VoltageCommand`` has it [V], (..., 3, 2)."""
-    thruster_torque: Array
+    thruster_torque: Annotated[Array, Unit("N m")]
     """On the bus, body axes [N m], (..., 3)."""
 
 

@@ -3,7 +3,6 @@
 Position, velocity and attitude are read once, at the start: the last fix before the descent.
 """
 
-from collections import namedtuple
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -30,7 +29,7 @@ class Shown(NamedTuple):
 
 def _joined(name: str, *parts: Any) -> Any:
     """Return a named tuple that has the fields of all ``parts``."""
-    return namedtuple(name, [field for part in parts for field in part._fields])
+    return NamedTuple(name, [(f, part.__annotations__[f]) for part in parts for f in part._fields])
 
 
 StructureState = _joined("StructureState", lander.State, Belief)

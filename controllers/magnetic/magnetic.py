@@ -1,11 +1,11 @@
 """Control by magnetic moments: B-dot against a tumble, and the unloading of wheels that point."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numba
 
-from mjspace.contract import Array, Gains, Measurement, Reference, gain
+from mjspace.contract import Array, Gains, Measurement, Reference, Unit, gain
 
 from ..attitude.linear_quadratic import Regulator, Signals
 
@@ -13,16 +13,16 @@ from ..attitude.linear_quadratic import Regulator, Signals
 class DipoleCommand(NamedTuple):
     """What a law asks of magnetorquers."""
 
-    dipole: Array
+    dipole: Annotated[Array, Unit("A m^2")]
     """Magnetic moment, body axes [A m^2], (..., 3)."""
 
 
 class Command(NamedTuple):
     """What wheels and magnetorquers are asked for."""
 
-    torque: Array
+    torque: Annotated[Array, Unit("N m")]
     """Of the wheels on the bus, body axes [N m], (..., 3)."""
-    dipole: Array
+    dipole: Annotated[Array, Unit("A m^2")]
     """Magnetic moment, body axes [A m^2], (..., 3)."""
 
 

@@ -103,6 +103,8 @@ class Phases:
         states: list[Any] = []
         commands: dict[str, Any] = {}
         signals: dict[str, Any] = {"phase": (1,)}
+        hints: dict[str, Any] = {}
+        signal_hints: dict[str, Any] = {}
         for phase in self.phases:
             states.append(phase.law.reset(measurement, reference))
             _, command, shown = phase.law.step(states[-1], 0.0, measurement, reference)
@@ -110,12 +112,18 @@ class Phases:
             signals |= {
                 f"{phase.name}_{n}": a.shape[len(lead) :] for n, a in _arrays(shown).items()
             }
+            hints |= _annotations(command)
+            signal_hints |= {f"{phase.name}_{n}": a for n, a in _annotations(shown).items()}
         none = np.zeros((*lead, 1))
         values = {"phase": none, "began": none.copy()}
         for phase, state in zip(self.phases, states, strict=True):
             values |= {f"{phase.name}_{name}": array for name, array in _arrays(state).items()}
         # What a state is made of goes with its type, so that a logged one can be flown from.
-        layout = _Layout(tuple(states), _tuple("Command", commands), _tuple("Signals", signals))
+        layout = _Layout(
+            tuple(states),
+            _tuple("Command", commands, hints=hints),
+            _tuple("Signals", signals, hints=signal_hints),
+        )
         return _tuple("State", values, layout)(*values.values())
 
     def step(
@@ -181,10 +189,21 @@ def _phase(number: int, table: Mapping[str, Any]) -> Phase:
     return phase
 
 
-def _tuple(name: str, shapes: Mapping[str, Any], layout: Any = None) -> Any:
-    """Return a named tuple type with those fields; ``layout`` says what they hold."""
+def _tuple(
+    name: str, shapes: Mapping[str, Any], layout: Any = None, hints: Mapping[str, Any] = {}
+) -> Any:
+    """Return a named tuple type with the fields of ``shapes``.
+
+    ``layout`` says what they hold, ``hints`` are their annotations, which carry the units.
+    """
     bare = namedtuple(name, list(shapes))  # type: ignore[misc]
-    return type(name, (bare,), {"__slots__": (), "layout": layout or dict(shapes)})
+    content = {"__slots__": (), "layout": layout or dict(shapes), "__annotations__": dict(hints)}
+    return type(name, (bare,), content)
+
+
+def _annotations(values: Any) -> dict[str, Any]:
+    """Return the annotations of the fields of a named tuple; none for None."""
+    return dict(getattr(type(values), "__annotations__", {}))
 
 
 def _filled(kind: Any, lead: tuple[int, ...], value: float) -> dict[str, Any]:

@@ -9,12 +9,12 @@ have leading vehicle axes.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
+from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, Unit, gain
 
 from ..attitude.turn_kernels import turn
 from .allocation import effect, pulses, share, within
@@ -30,9 +30,9 @@ class State(NamedTuple):
 class Signals(NamedTuple):
     """What the law shows."""
 
-    angle: Array
+    angle: Annotated[Array, Unit("rad")]
     """Rotation vector from where the body should be [rad], body axes, (..., 3)."""
-    angle_rate: Array
+    angle_rate: Annotated[Array, Unit("rad/s")]
     """Rate less the wanted rate [rad/s], body axes, (..., 3)."""
     torque: Array
     """That is asked for [N m], body axes, (..., 3)."""

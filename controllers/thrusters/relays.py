@@ -8,12 +8,12 @@ arrays may have leading vehicle axes; m is the number of axes.
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, gain
+from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, Unit, gain
 
 from ..attitude.turn_kernels import turn
 from .allocation import effect, pattern
@@ -33,7 +33,7 @@ class Aim(NamedTuple):
     """Of the desired axes, as a quaternion to inertial axes, (..., 4)."""
     rate: Array
     """Of the desired axes, in these axes [rad/s], (..., 3)."""
-    acceleration: Array
+    acceleration: Annotated[Array, Unit("rad/s^2")]
     """Of the desired axes [rad/s^2], (..., 3): held until the next control instant."""
     on_time: Array
     """Of each thruster in the integration step that begins [s], (..., n)."""
@@ -42,9 +42,9 @@ class Aim(NamedTuple):
 class Signals(NamedTuple):
     """What a law shows."""
 
-    angle: Array
+    angle: Annotated[Array, Unit("rad")]
     """a: of the body from where it should be, about each axis [rad], (..., m)."""
-    angle_rate: Array
+    angle_rate: Annotated[Array, Unit("rad/s")]
     """a' [rad/s], (..., m)."""
     firing: Array
     """1.0 or -1.0 while thrusters turn it that way about an axis, else 0.0, (..., m)."""

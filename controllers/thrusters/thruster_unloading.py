@@ -1,11 +1,11 @@
 """Wheels that point, unloaded by thrusters meanwhile."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, gain
+from mjspace.contract import Array, Measurement, Reference, Unit, gain
 
 from ..attitude.linear_quadratic import Regulator, Signals
 
@@ -13,9 +13,9 @@ from ..attitude.linear_quadratic import Regulator, Signals
 class Command(NamedTuple):
     """What wheels and thrusters are asked for."""
 
-    torque: Array
+    torque: Annotated[Array, Unit("N m")]
     """Of the wheels on the bus, body axes [N m], (..., 3)."""
-    thruster_torque: Array
+    thruster_torque: Annotated[Array, Unit("N m")]
     """On the bus, body axes [N m], (..., 3)."""
 
 

@@ -15,6 +15,7 @@ from google.protobuf.descriptor_pb2 import (
 from mcap.records import Channel, Schema
 
 from mjspace.log.encoding import Fields
+from mjspace.units import Unit
 
 PERIODIC = {
     "/state": "mjspace.State",
@@ -42,7 +43,7 @@ class Scene(NamedTuple):
 
 
 def channels(
-    topics: Mapping[str, Fields], units: Mapping[str, Mapping[str, str]]
+    topics: Mapping[str, Fields], units: Mapping[str, Mapping[str, Unit]]
 ) -> tuple[list[Schema], list[Channel]]:
     """Return the records that declare ``topics``, then /tf, /scene, /events and /robot_description.
 
@@ -68,7 +69,7 @@ def channels(
             raise ValueError(f"no topic {topic!r}: have {', '.join(PERIODIC)}")
         metadata = {f"shape.{name}": ",".join(map(str, shape)) for name, shape in fields.items()}
         known = units.get(topic, {})
-        metadata |= {f"unit.{name}": known[name] for name in fields if name in known}
+        metadata |= {f"unit.{name}": known[name].si for name in fields if name in known}
         declare(topic, PERIODIC[topic], "protobuf", _descriptor(PERIODIC[topic], fields), metadata)
     for topic, message in _FOXGLOVE.items():
         described = message.DESCRIPTOR

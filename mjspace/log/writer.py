@@ -15,6 +15,7 @@ from mjspace.log.digest import RECORD, RowDigests
 from mjspace.log.encoding import Fields, doubles, side_by_side, transforms, varint5
 from mjspace.log.file import LogFile
 from mjspace.log.schema import Scene, channels
+from mjspace.units import Unit
 
 
 class LogWriter:
@@ -32,12 +33,12 @@ class LogWriter:
         metadata: Mapping[str, str],
         attachments: Mapping[str, tuple[str, bytes]],
         scene: Scene,
-        units: Mapping[str, Mapping[str, str]],
+        units: Mapping[str, Mapping[str, Unit]],
     ) -> None:
         """Create the file.
 
-        ``topics`` gives each periodic topic's fields with their shapes, ``units`` the SI unit of
-        some of them by topic and field; ``attachments`` are (media type, content) by name.
+        ``topics`` gives each periodic topic's fields with their shapes, ``units`` the unit
+        of some of them by topic and field; ``attachments`` are (media type, content) by name.
 
         Raises:
             OSError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""A log as a page of plots: how well it pointed, with what torques, and what the law thought."""
+"""A log as a page of plots: pointing errors, torques and the law's own signals."""
 
 import textwrap
 from collections.abc import Sequence
@@ -93,15 +93,15 @@ def _draw(axes: Any, one: Curves, colors: Sequence[str]) -> None:
     panel, count = one.panel, len(colors)
     for i, (name, color) in enumerate(zip(panel.names or range(count), colors, strict=True)):
         axes.plot(one.time[:, i], one.value[:, i], color=color, label=str(name))
-        if one.wanted is not None and one.wanted_time is not None:
+        if one.desired is not None and one.desired_time is not None:
             axes.plot(
-                one.wanted_time[:, i],
-                one.wanted[:, i],
+                one.desired_time[:, i],
+                one.desired[:, i],
                 color=color,
                 linewidth=2.6,
                 alpha=0.3,
                 zorder=1,
-                label="wanted" if i == count - 1 else None,
+                label="desired" if i == count - 1 else None,
             )
     unit = f" [{panel.unit}]" if panel.unit else ""
     axes.set_title(panel.title + unit, loc="left", fontweight="bold", fontsize=9.5)

@@ -1,31 +1,32 @@
-"""What a plot shows of a log: one panel for each signal that has something to show."""
+"""The panels of a page: one for each signal that has something to show."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.log import topics
 from mjspace.log.reader import Log
 from mjspace.plotting.decimate import outline
 from mjspace.signals import find_signal
+from mjspace.units import Unit
 
-DEGREES = float(np.degrees(1.0))
-RPM = 30.0 / np.pi
-WANTED_RATE = "/reference", "rate"
+DECLARED = topics.units()
+NO_UNIT = Unit("")
+DESIRED_RATE = "/reference", "rate"
 LAW_PANELS = 4
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A signal and how a person reads it."""
+    """A signal and how it is drawn."""
 
     title: str
     topic: str
     field: str
-    unit: str = ""
-    scale: float = 1.0
-    """From SI to ``unit``."""
+    quantity: Unit = NO_UNIT
     part: slice | None = None
     """The one component that is drawn; all when left out."""
     names: str = ""
@@ -33,8 +34,18 @@ class Panel:
     log_scale: bool = False
     drift: bool = False
     """Drawn is the norm of the change since the first row."""
-    wanted: tuple[str, str] | None = None
-    """Topic and field of what it should be."""
+    desired: tuple[str, str] | None = None
+    """Topic and field of its desired value."""
+
+    @property
+    def unit(self) -> str:
+        """Of the drawn values."""
+        return self.quantity.displayed[0]
+
+    @property
+    def scale(self) -> float:
+        """Factor from SI to ``unit``."""
+        return self.quantity.displayed[1]
 
 
 @dataclass(frozen=True)
@@ -44,30 +55,32 @@ class Curves:
     panel: Panel
     time: Array
     value: Array
-    wanted_time: Array | None = None
-    wanted: Array | None = None
+    desired_time: Array | None = None
+    desired: Array | None = None
+
+
+def _standard(title: str, topic: str, field: str, **drawn: Any) -> Panel:
+    return Panel(title, topic, field, DECLARED[topic][field], **drawn)
 
 
 STANDARD = (
-    Panel("Attitude error", "/truth", "attitude_error", "deg", DEGREES, log_scale=True),
-    Panel("Body rate", "/truth", "rate", "deg/s", DEGREES, names="xyz", wanted=WANTED_RATE),
-    Panel("Commanded torque on the bus", "/command", "torque", "N m", names="xyz"),
-    Panel("Wheel motor torque", "/command", "wheel_torque", "N m"),
-    Panel("Motor torque", "/command", "motor_torque", "N m"),
-    Panel("Gimbal angle", "/truth", "gimbal_angle", "deg", DEGREES),
-    Panel("Gimbal rate", "/truth", "gimbal_rate", "rad/s", wanted=("/command", "gimbal_rate")),
-    Panel("Wheel speed", "/truth", "wheel_speed", "rpm", RPM),
-    Panel("Change of total momentum", "/truth", "momentum", "N m s", log_scale=True, drift=True),
-    Panel(
-        "Disturbance torque about the centre of mass", "/disturbance", "torque", "N m", names="xyz"
-    ),
+    _standard("Attitude error", "/truth", "attitude_error", log_scale=True),
+    _standard("Body rate", "/truth", "rate", names="xyz", desired=DESIRED_RATE),
+    _standard("Commanded torque on the bus", "/command", "torque", names="xyz"),
+    _standard("Wheel motor torque", "/command", "wheel_torque"),
+    _standard("Motor torque", "/command", "motor_torque"),
+    _standard("Gimbal angle", "/truth", "gimbal_angle"),
+    _standard("Gimbal rate", "/truth", "gimbal_rate", desired=("/command", "gimbal_rate")),
+    _standard("Wheel speed", "/truth", "wheel_speed"),
+    _standard("Change of total momentum", "/truth", "momentum", log_scale=True, drift=True),
+    _standard("Disturbance torque about the centre of mass", "/disturbance", "torque", names="xyz"),
 )
 
 
 def curves(log: Log) -> Iterator[Curves]:
-    """Yield what the page shows: the standard signals, and the first of the law's own that move.
+    """Yield the curves of the standard page: its signals, and the first of the law's that change.
 
-    A signal that is zero throughout is left out, and so is a law's that never changes.
+    A signal that is zero throughout is left out, and so is one of the law's that never changes.
     """
     for panel in STANDARD:
         if log.topics.get(panel.topic, {}).get(panel.field, (0,)) != (0,):
@@ -105,13 +118,19 @@ def read(log: Log, panel: Panel) -> Curves:
         return panel.scale * rows
 
     time, value = outline(log, panel.topic, panel.field, change)
-    if panel.wanted is None or panel.wanted[1] not in log.topics.get(panel.wanted[0], {}):
+    if panel.desired is None or panel.desired[1] not in log.topics.get(panel.desired[0], {}):
         return Curves(panel, time, value)
-    return Curves(panel, time, value, *outline(log, *panel.wanted, change))
+    return Curves(panel, time, value, *outline(log, *panel.desired, change))
+
+
+def unit(log: Log, topic: str, field: str) -> Unit:
+    """Return the unit that a logged field has, and how it is displayed if that is declared."""
+    si = log.units.get(topic, {}).get(field, "")
+    declared = DECLARED.get(topic, {}).get(field, NO_UNIT)
+    return declared if declared.si == si else Unit(si)
 
 
 def _of_signal(log: Log, signal: str) -> Panel:
     topic, field, part = find_signal(log.topics, signal)
-    unit = log.units.get(topic, {}).get(field, "")
-    title = signal.removeprefix("law.") if topic == "/law" else signal
-    return Panel(f"Law: {title}" if topic == "/law" else title, topic, field, unit, part=part)
+    title = f"Law: {signal.removeprefix('law.')}" if topic == "/law" else signal
+    return Panel(title, topic, field, unit(log, topic, field), part=part)

@@ -12,14 +12,13 @@ from matplotlib.figure import Figure
 from mjspace.contract import Array
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
-from mjspace.plotting.panels import DEGREES
+from mjspace.plotting.panels import unit
 from mjspace.plotting.style import COLORS, FAINT, INK, STYLE
 from mjspace.signals import find_signal
 
 WIDTH, HEIGHT = 7.5, 6.0  # inches
 GROUPS = 6
 """Of thrusters that fire together are told apart: those that do so longest."""
-_IN_DEGREES = {"rad": "deg", "rad/s": "deg/s"}
 _ARROWS = (0.12, 0.37, 0.62, 0.87)  # of the way
 
 
@@ -70,7 +69,7 @@ def figure(log: Log, x: str, y: str) -> Figure:
 
 
 def _component(log: Log, signal: str) -> tuple[Array, str]:
-    """Return the signal's values (n,) and how an axis calls them."""
+    """Return the signal's values (n,) in the displayed unit, and the label of their axis."""
     topic, field, part = find_signal(log.topics, signal)
     if part.stop - part.start != 1:
         raise ValueError(
@@ -78,10 +77,8 @@ def _component(log: Log, signal: str) -> tuple[Array, str]:
         )
     rows = log.read(topic, [field])[field]
     values = rows.reshape(len(rows), -1)[:, part.start]
-    unit = log.units.get(topic, {}).get(field, "")
-    if unit in _IN_DEGREES:
-        unit, values = _IN_DEGREES[unit], DEGREES * values
-    return values, f"{signal} [{unit}]" if unit else signal
+    name, scale = unit(log, topic, field).displayed
+    return scale * values, f"{signal} [{name}]" if name else signal
 
 
 def _show_thrusters(axes: Any, across: Array, up: Array, firing: Any) -> None:

@@ -1,4 +1,4 @@
-"""A flight's log: what is attached, which units, and blocks of periods as they come."""
+"""A flight's log: its attachments, and blocks of control periods as they are flown."""
 
 from pathlib import Path
 from types import TracebackType
@@ -7,7 +7,7 @@ from typing import Self
 import mujoco
 import numpy as np
 
-from mjspace.log import foxglove_layout, provenance
+from mjspace.log import foxglove_layout, provenance, topics
 from mjspace.log.scene import scene
 from mjspace.log.writer import LogWriter
 from mjspace.scenario.loading import to_toml
@@ -16,75 +16,6 @@ from mjspace.simulation.recording import Block, one_vehicle, shapes
 from mjspace.vehicle import vehicle
 
 FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
-
-UNITS = {
-    "/truth": {
-        "rate": "rad/s",
-        "wheel_speed": "rad/s",
-        "gimbal_angle": "rad",
-        "gimbal_rate": "rad/s",
-        "wheel_angle": "rad",
-        "current": "A",
-        "position": "m",
-        "velocity": "m/s",
-        "position_error": "m",
-        "tilt": "rad",
-        "altitude": "m",
-        "ground_velocity": "m/s",
-        "magnetic_field": "T",
-        "thrust": "N",
-        "propellant": "kg",
-        "momentum": "N m s",
-        "energy": "J",
-        "attitude_error": "rad",
-        "foot_force": "N",
-        "hull_force": "N",
-        "touchdown_velocity": "m/s",
-        "crash_velocity": "m/s",
-    },
-    "/measurement": {
-        "rate": "rad/s",
-        "wheel_speed": "rad/s",
-        "gimbal_angle": "rad",
-        "gimbal_rate": "rad/s",
-        "wheel_angle": "rad",
-        "current": "A",
-        "position": "m",
-        "velocity": "m/s",
-        "specific_force": "m/s^2",
-        "altitude": "m",
-        "ground_velocity": "m/s",
-        "magnetic_field": "T",
-        "thrust": "N",
-        "propellant": "kg",
-    },
-    "/reference": {
-        "rate": "rad/s",
-        "acceleration": "rad/s^2",
-        "position": "m",
-        "velocity": "m/s",
-        "linear_acceleration": "m/s^2",
-    },
-    "/command": {
-        "torque": "N m",
-        "wheel_torque": "N m",
-        "motor_torque": "N m",
-        "gimbal_rate": "rad/s",
-        "thruster_torque": "N m",
-        "dipole": "A m^2",
-        "magnetic_moment": "A m^2",
-        "thrust": "N",
-        "gimbal": "rad",
-        "on_time": "s",
-        "thruster_thrust": "N",
-        "acceleration": "rad/s^2",
-        "load": "N m",
-        "voltage": "V",
-        "engine": "N m, N m, N",
-    },
-    "/law": {"angle": "rad", "angle_rate": "rad/s"},
-    "/disturbance": {"force": "N", "torque": "N m"},
-}
 
 
 class Recorder:
@@ -113,7 +44,7 @@ class Recorder:
             provenance.metadata(assembly.scenario, compiled, member),
             attachments,
             scene(model),
-            UNITS,
+            topics.units(first.kinds),
         )
         self._model, self._data = model, mujoco.MjData(model)
         self._stride = max(1, round(FRAME_PERIOD / assembly.scenario.rates.control))

@@ -84,6 +84,7 @@ def log_data(log: Log) -> dict[str, Any]:
             topic: {field: list(shape) for field, shape in fields.items()}
             for topic, fields in log.topics.items()
         },
+        "units": log.units,
         "attachments": sorted(log.attachments),
         "events": [
             {"time": time, "level": level, "message": message}
@@ -101,8 +102,12 @@ def print_log(log: Log) -> None:
     for key, value in log.metadata.items():
         table.add_row(key, escape(value))
     for topic, fields in log.topics.items():
-        listed = (f"{name} {'x'.join(map(str, shape)) or 1}" for name, shape in fields.items())
-        table.add_row(topic, ", ".join(listed))
+        units = log.units[topic]
+        listed = []
+        for name, shape in fields.items():
+            size = "x".join(map(str, shape)) or "1"
+            listed.append(f"{name} {size}" + (f" [{units[name]}]" if name in units else ""))
+        table.add_row(topic, escape(", ".join(listed)))
     table.add_row("attachments", ", ".join(sorted(log.attachments)))
     altered = log.altered()
     if altered is not None:

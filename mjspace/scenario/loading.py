@@ -24,6 +24,11 @@ def scenario_names() -> list[str]:
     return sorted(p.name[:-5] for p in folder.iterdir() if p.name.endswith(".toml"))
 
 
+def list_scenarios() -> dict[str, str]:
+    """Return the description of each scenario that comes with mjspace, by name."""
+    return {name: load(name)[0].description for name in scenario_names()}
+
+
 def load(scenario: str | Path, overrides: Iterable[str] = ()) -> tuple[Scenario, Path]:
     """Return the scenario of that name or path, and the folder its own files are beside.
 

@@ -1,7 +1,7 @@
 """What a flight records: its control periods, turned into rows block by block."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any
 
@@ -28,6 +28,8 @@ class Block:
     time: Array
     rows: Rows
     events: list[Event]
+    kinds: dict[str, type] = field(default_factory=dict)
+    """The named tuple that was recorded on a topic, of those that users' code returns."""
 
 
 def one_vehicle(block: Block, vehicle: int = 0) -> Rows:
@@ -61,7 +63,7 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
     problem = f"{culprit} is not finite, or beyond 1e10, at t = {block.time[first]:.6g} s"
     rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
     events = [event for event in block.events if event.time < block.time[first]]
-    return Block(block.period, block.time[:first], rows, events), problem
+    return replace(block, time=block.time[:first], rows=rows, events=events), problem
 
 
 @dataclass
@@ -140,7 +142,14 @@ class Recording:
             vehicle.motors,
         )
         events += [event for period in self.periods for event in period.events]
-        return Block(self.first, time, {t: f for t, f in rows.items() if f}, events)
+        first = self.periods[0]
+        kinds = {
+            "/state": type(first.law),
+            "/reference": type(self.reference),
+            "/command": type(first.command),
+            "/law": type(first.signals),
+        }
+        return Block(self.first, time, {t: f for t, f in rows.items() if f}, events, kinds)
 
 
 def _position_errors(

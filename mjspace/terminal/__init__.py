@@ -1,1 +1,1 @@
-"""What the command line shows: options, progress, reports of errors."""
+"""The command line's options, progress bars and error reports."""

@@ -17,8 +17,8 @@ pytest.importorskip("dm_control")
 
 from dm_env import StepType, TimeStep, test_utils
 
+from mjspace import dm_env
 from mjspace.contract import Measurement
-from mjspace.dm_env import environment as environments
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load, scenario_names
 from mjspace.simulation.assembly import Assembly, assemble
@@ -58,7 +58,7 @@ class _Conformance(test_utils.EnvironmentTestMixin):
     overrides: Sequence[str] = ()
 
     def make_object_under_test(self) -> Any:
-        return environments.load(self.scenario, [SHORT, *self.overrides])
+        return dm_env.load(self.scenario, [SHORT, *self.overrides])
 
     def make_action_sequence(self) -> Iterator[np.ndarray]:
         spec = self.environment.action_spec()
@@ -105,12 +105,12 @@ OF_A_LAW = {"wheel-stuck"}
 @pytest.mark.parametrize("scenario", sorted(OF_A_LAW))
 def test_a_fault_that_depends_on_a_law_is_refused(scenario: str) -> None:
     with pytest.raises(InputError, match=r"faults\.0\.when\.signal: law\.path: an environment fl"):
-        environments.load(scenario)
+        dm_env.load(scenario)
 
 
 @pytest.mark.parametrize("scenario", sorted({*scenario_names()} - OF_A_LAW))
 def test_every_scenario_is_an_environment(scenario: str) -> None:
-    environment = environments.load(scenario)
+    environment = dm_env.load(scenario)
     environment.reset()
     spec = environment.action_spec()
     step = environment.step(np.clip(np.zeros(spec.shape), spec.minimum, spec.maximum))
@@ -206,7 +206,7 @@ def test_the_law_flies_the_same_flight_bit_for_bit(
         f"measured_{n}": np.concatenate([block.rows["/measurement"][n][:, 0] for block in blocks])
         for n in blocks[0].rows["/measurement"]
     }
-    environment = environments.load(scenario, overrides)
+    environment = dm_env.load(scenario, overrides)
     for _ in range(2):  # the second episode starts where the first did
         rows = fly_law(environment, built)
         assert rows[0].keys() == logged.keys()
@@ -216,7 +216,7 @@ def test_the_law_flies_the_same_flight_bit_for_bit(
 
 def at_rest(*overrides: str) -> Any:
     """Return a spacecraft at rest, 2 deg from the attitude that it is to hold."""
-    return environments.load(
+    return dm_env.load(
         "contraction-regulation",
         [
             SHORT,
@@ -294,7 +294,7 @@ def test_readings_are_of_the_instant_of_the_state() -> None:
 
 
 def test_an_observation_is_the_agents_own() -> None:
-    environment = environments.load("contraction-noise", [SHORT, *NOISY])
+    environment = dm_env.load("contraction-noise", [SHORT, *NOISY])
     first = environment.reset().observation
     kept = {name: values.copy() for name, values in first.items()}
     environment.step(np.ones(3))
@@ -306,7 +306,7 @@ def test_an_observation_is_the_agents_own() -> None:
 
 
 def test_an_episode_ends_with_the_scenario() -> None:
-    environment = environments.load("contraction-adaptive", ["duration=0.3", "rates.control=0.1"])
+    environment = dm_env.load("contraction-adaptive", ["duration=0.3", "rates.control=0.1"])
     environment.reset()
     steps = [environment.step(np.zeros(3)) for _ in range(4)]
     assert [step.step_type for step in steps] == [
@@ -321,7 +321,7 @@ def test_an_episode_ends_with_the_scenario() -> None:
 
 @pytest.mark.parametrize("action", [np.nan, np.inf, 1e300, 1e11])
 def test_an_episode_ends_where_the_state_is_not_finite(action: float) -> None:
-    environment = environments.load("contraction-adaptive", [SHORT])
+    environment = dm_env.load("contraction-adaptive", [SHORT])
     start = environment.reset()
     for _ in range(3):
         step = environment.step(np.full(3, action))
@@ -363,9 +363,9 @@ def test_works_without_any_opengl() -> None:
         "    def find_spec(self, name, *_):\n"
         "        if name == 'OpenGL.platform': raise AttributeError('no glGetError')\n"
         "sys.meta_path.insert(0, Broken())\n"
-        "from mjspace.dm_env import environment as environments\n"
+        "from mjspace import dm_env\n"
         "from dm_control import _render\n"
-        f"environment = environments.load('contraction-ideal', ['{SHORT}'])\n"
+        f"environment = dm_env.load('contraction-ideal', ['{SHORT}'])\n"
         "environment.reset(); environment.step([0.0, 0.0, 0.0])\n"
         "print(_render.BACKEND, os.environ.get('MUJOCO_GL'))"
     )

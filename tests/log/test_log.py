@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from log_samples import ATTACHMENTS, BLOCKS, METADATA, UNITS, create, fly, rows, write_block
+from log_samples import ATTACHMENTS, BLOCKS, METADATA, create, fly, rows, write_block
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Channel, Schema
 from mcap.stream_reader import StreamReader
@@ -86,7 +86,7 @@ def test_what_describes_the_flight_comes_back(flown: Path) -> None:
     assert {name: log.attachment(name) for name in log.attachments} == {
         name: content for name, (_, content) in ATTACHMENTS.items()
     }
-    assert log.units == {"/state": {}, "/law": {}, **UNITS}
+    assert log.units == {"/state": {}, "/law": {}, "/truth": {"attitude_error": "rad"}}
     ends = np.cumsum(BLOCKS)
     middles = [end - count + count // 2 for end, count in zip(ends, BLOCKS, strict=True)]
     assert log.events() == [(k / 1000, 0, "WARNING", f"period {k}") for k in middles]
@@ -112,10 +112,10 @@ def test_an_event_after_the_last_period_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     with create(path) as log:
         write_block(log, 0, 10)
-        log.event(0.009, 0, "INFO", "flushed")
+        log.event(0.009, "INFO", "flushed")
         log.flush()
         assert Log(path).events()[-1] == (0.009, 0, "INFO", "flushed")
-        log.event(0.009, 0, "ERROR", "closed")
+        log.event(0.009, "ERROR", "closed")
     assert Log(path).events()[-1] == (0.009, 0, "ERROR", "closed")
     assert len(Log(path)) == 10
 

@@ -214,7 +214,7 @@ def test_bounds_are_drawn(page: Figure, log: Log) -> None:
 
 def test_named_signals_are_drawn_alone(log: Log) -> None:
     assert titles(figure(log, ["truth.rate[2]", "law.theta_hat", "disturbance.force"])) == [
-        "truth.rate[2] [rad/s]",
+        "truth.rate[2] [deg/s]",
         "Law: theta_hat",
         "disturbance.force [N]",
     ]

@@ -42,7 +42,7 @@ def test_the_path_is_in_degrees_and_colored_where_thrusters_fire(flown: Path) ->
 
 def test_signals_of_no_thruster_may_be_drawn(pictured_log: Path) -> None:
     axes = figure(Log(pictured_log), "truth.rate[0]", "truth.wheel_speed[0]").axes[0]
-    assert axes.get_ylabel() == "truth.wheel_speed[0] [deg/s]"
+    assert axes.get_ylabel() == "truth.wheel_speed[0] [rpm]"
     assert not axes.collections
 
 

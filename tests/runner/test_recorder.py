@@ -12,6 +12,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.contract import Measurement, Reference
+from mjspace.log import topics
 from mjspace.log.chunk import encode
 from mjspace.log.reader import Log
 from mjspace.runner.replay import assembly_of
@@ -184,10 +185,9 @@ def test_each_field_has_a_unit_and_each_unit_a_field(scenario: str, tmp_path: Pa
 
 
 def test_one_name_has_one_unit() -> None:
-    from mjspace.runner.recorder import UNITS
-
+    declared = topics.units()
     by_name: dict[str, set[str]] = {}
     for topic in ("/truth", "/measurement", "/reference"):
-        for name, unit in UNITS[topic].items():
-            by_name.setdefault(name, set()).add(unit)
+        for name, unit in declared[topic].items():
+            by_name.setdefault(name, set()).add(unit.si)
     assert {name: units for name, units in by_name.items() if len(units) > 1} == {}

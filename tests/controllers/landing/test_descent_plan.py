@@ -135,7 +135,7 @@ def test_the_least_is_found_with_one_cost_for_each_step() -> None:
 def test_it_is_the_same_on_any_number_of_threads() -> None:
     program = (
         "import numpy as np\n"
-        "from mjspace.controllers.descent_limits import Limits, thriftiest\n"
+        "from mjspace.controllers.landing.descent_limits import Limits, thriftiest\n"
         f"points, cost = thriftiest(30.0, np.array({ABOVE.tolist()}), np.zeros(3), {MOON})\n"
         "print(cost.hex(), points.tobytes().hex())\n"
     )

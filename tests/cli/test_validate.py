@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from mjspace.validation import basilisk, command
+from mjspace.cli import validation
+from mjspace.validation import basilisk
 from mjspace.validation.benchmark import Bound
 from mjspace.validation.benchmarks import ALL
 from mjspace.validation.results import Injected, Results, Row, Section
@@ -78,7 +79,7 @@ def test_the_verdict_is_the_exit_status(
     )
     monkeypatch.setattr("mjspace.validation.suite.validate", lambda *_, **__: results)
     with pytest.raises(typer.Exit) as ended:
-        command.validate(only=["torque-free"], quick=True, out=tmp_path)
+        validation.validate(only=["torque-free"], quick=True, out=tmp_path)
     assert ended.value.exit_code == (0 if passed else 1)
     assert json.loads((tmp_path / "validation.json").read_text())["passed"] is passed
 

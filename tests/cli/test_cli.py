@@ -135,7 +135,11 @@ def test_info_shows_a_scenario_with_its_defaults_and_a_log(
     found = json.loads(mjspace("info", flown[0], "--json").stdout)
     assert found["complete"] is True
     assert found["topics"]["/truth"]["rate"] == [3]
-    assert "contraction-ideal" in mjspace("info", flown[0]).stdout
+    assert found["units"]["/truth"]["rate"] == "rad/s"
+    assert found["units"]["/law"] == {}
+    shown = " ".join(mjspace("info", flown[0]).stdout.split())
+    assert "contraction-ideal" in shown
+    assert "rate 3 [rad/s]" in shown
 
 
 def test_replay_verifies_and_flies_another_law(

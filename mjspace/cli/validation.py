@@ -8,7 +8,7 @@ import typer
 from mjspace.errors import InputError, input_error_at
 from mjspace.runner import workers
 from mjspace.terminal.options import Json
-from mjspace.terminal.terminal import progress_bar
+from mjspace.terminal.reporting import progress_bar
 
 
 def validate(

@@ -1,0 +1,38 @@
+"""The command line: ``mjspace list | info | run | replay | render | plot | validate``.
+
+Exit status: 0 every check came out as the scenario expects, 1 flown but one did not (or a replay
+differed, or the flight ended early), 2 bad input. Modules are imported when a command needs them:
+``--help`` answers at once.
+"""
+
+import warnings
+
+import typer
+
+from mjspace.cli import flights, pictures, scenarios, validation
+from mjspace.errors import print_warning
+from mjspace.rendering import graphics
+from mjspace.terminal.reporting import report_errors
+
+app = typer.Typer(
+    help="Fly control laws on multibody spacecraft in MuJoCo.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # plain help, in half the time
+)
+app.command("list")(scenarios.list_scenarios)
+app.command()(scenarios.info)
+app.command()(flights.run)
+app.command()(flights.replay)
+app.command()(pictures.render)
+app.command()(pictures.plot)
+app.command()(validation.validate)
+
+
+def main() -> None:
+    """Run the command line; the entry point."""
+    warnings.showwarning = print_warning
+    with report_errors():
+        graphics.check()
+        app()

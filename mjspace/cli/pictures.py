@@ -1,0 +1,66 @@
+"""The commands ``mjspace render`` and ``mjspace plot``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mjspace.errors import InputError, input_error_at
+from mjspace.terminal.options import LogFile
+from mjspace.terminal.reporting import open_log, progress_bar
+
+
+def render(
+    log: LogFile,
+    output: Annotated[Path, typer.Option("-o", "--output", help="x.mp4, or x.png for a still.")],
+    camera: Annotated[str, typer.Option(help="A camera of the model.")] = "chase",
+    size: Annotated[str, typer.Option(metavar="WxH", help="In pixels.")] = "960x540",
+    rate: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds for each second.")] = 1.0,
+    at: Annotated[float | None, typer.Option(help="Time of a still [s]; else the end.")] = None,
+) -> None:
+    """Render a log to a video or a picture, offscreen."""
+    from mjspace.rendering.render import render as to_picture
+
+    width, _, height = size.partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise InputError(f"--size {size}: write width and height in pixels, as in 960x540")
+    with progress_bar(open_log(log).end, "rendering") as progress, input_error_at("render"):
+        to_picture(
+            log,
+            output,
+            camera=camera,
+            size=(int(width), int(height)),
+            rate=rate,
+            speed=speed,
+            at=at,
+            progress=progress,
+        )
+    print(output)
+
+
+def plot(
+    log: LogFile,
+    output: Annotated[Path, typer.Option("-o", "--output", help="A PNG file.")],
+    signals: Annotated[
+        list[str],
+        typer.Option("--signal", help="Plot this signal, as truth.rate[0]; repeatable."),
+    ] = [],  # noqa: B006
+    phase: Annotated[
+        tuple[str, str] | None,
+        typer.Option(metavar="X Y", help="Plot a phase plane: one signal against another."),
+    ] = None,
+) -> None:
+    """Plot a log to a PNG page."""
+    from mjspace.plotting import phase_plane
+    from mjspace.plotting.page import plot as to_picture
+
+    if phase and signals:
+        raise InputError("--phase: is a picture of its own: leave --signal out")
+    open_log(log)
+    with input_error_at("plot"):
+        if phase:
+            phase_plane.plot(log, output, *phase)
+        else:
+            to_picture(log, output, signals=signals)
+    print(output)

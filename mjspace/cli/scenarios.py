@@ -1,0 +1,44 @@
+"""The commands ``mjspace list`` and ``mjspace info``."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mjspace.terminal.options import Json, Set
+from mjspace.terminal.reporting import open_log
+
+
+def list_scenarios(as_json: Json = False) -> None:
+    """List the scenarios that come with mjspace."""
+    from mjspace.scenario import loading
+
+    found = loading.list_scenarios()
+    if as_json:
+        print(json.dumps(found, indent=2))
+        return
+    width = max(map(len, found))
+    for name, description in found.items():
+        print(f"{name:{width}}  {description}")
+
+
+def info(
+    target: Annotated[str, typer.Argument(metavar="SCENARIO|LOG")],
+    overrides: Set = [],  # noqa: B006
+    as_json: Json = False,
+) -> None:
+    """Show a scenario in full, or what a log holds."""
+    if target.endswith(".mcap"):
+        from mjspace.runner import report
+
+        log = open_log(Path(target))
+        if as_json:
+            print(json.dumps(report.log_data(log), indent=2))
+        else:
+            report.print_log(log)
+        return
+    from mjspace.scenario.loading import load, to_toml
+
+    scenario, _ = load(target, overrides)
+    print(scenario.model_dump_json(indent=2) if as_json else to_toml(scenario).rstrip())

@@ -1,0 +1,90 @@
+"""The unit of each logged field, by topic, read from where the field is declared."""
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from mjspace.contract import (
+    Array,
+    GimbalRateCommand,
+    Measurement,
+    PulseCommand,
+    Reference,
+    ThrustCommand,
+    TorqueCommand,
+    Trajectory,
+    Truth,
+    VoltageCommand,
+)
+from mjspace.units import Unit, units_of
+
+
+class DerivedTruth:
+    """The fields of ``/truth`` that are computed from the state for the log alone."""
+
+    attitude_error: Annotated[Array, Unit("rad")]
+    """Angle of the rotation from the desired to the true attitude, shape (1,)."""
+    position_error: Annotated[Array, Unit("m")]
+    """True less desired position, inertial axes, shape (3,); where a position is desired."""
+    tilt: Annotated[Array, Unit("rad")]
+    """Angle between the z axes of the body and of the world, shape (1,)."""
+    momentum: Annotated[Array, Unit("N m s")]
+    """Total angular momentum about the centre of mass, inertial axes, shape (3,)."""
+    energy: Annotated[Array, Unit("J")]
+    """Kinetic energy, shape (1,)."""
+    foot_force: Annotated[Array, Unit("N")]
+    """Magnitude of the ground's force on each foot, shape (f,)."""
+    hull_force: Annotated[Array, Unit("N")]
+    """Sum of the magnitudes of the ground's forces on all other parts, shape (1,)."""
+    touchdown_velocity: Annotated[Array, Unit("m/s")]
+    """Velocity of the bus at the first contact with the ground, shape (3,)."""
+    crash_velocity: Annotated[Array, Unit("m/s")]
+    """Velocity of the bus at the crash, shape (3,)."""
+
+
+class AppliedCommand:
+    """The fields of ``/command`` that the actuators add: what they apply of the law's command."""
+
+    wheel_torque: Annotated[Array, Unit("N m")]
+    motor_torque: Annotated[Array, Unit("N m")]
+    thruster_torque: Annotated[Array, Unit("N m")]
+    thruster_thrust: Annotated[Array, Unit("N")]
+    magnetic_moment: Annotated[Array, Unit("A m^2")]
+    engine: Annotated[Array, Unit("N m, N m, N")]
+    """Torques of the two gimbal motors, thrust."""
+
+
+class Disturbance:
+    """The fields of ``/disturbance``: the environment's total on the vehicle."""
+
+    force: Annotated[Array, Unit("N")]
+    torque: Annotated[Array, Unit("N m")]
+
+
+DECLARED: Mapping[str, tuple[type, ...]] = {
+    "/truth": (Truth, DerivedTruth),
+    "/measurement": (Measurement,),
+    "/reference": (Reference, Trajectory),
+    "/command": (
+        TorqueCommand, VoltageCommand, GimbalRateCommand, ThrustCommand, PulseCommand,
+        AppliedCommand,
+    ),
+    "/disturbance": (Disturbance,),
+}  # fmt: skip
+"""Classes that declare the fields of each topic; a law's own may declare more."""
+
+
+def units(kinds: Mapping[str, type] = {}) -> dict[str, dict[str, Unit]]:
+    """Return the unit of each field that has one, by topic.
+
+    ``kinds`` are the named tuples that a flight recorded on a topic, such as the law's signals on
+    ``/law``: what their fields declare comes before what the contract says of that name. Of
+    ``/state`` it is the law's state, whose fields are logged under ``law_<name>``.
+    """
+    found: dict[str, dict[str, Unit]] = {}
+    for topic, declared in DECLARED.items():
+        found[topic] = {name: unit for kind in declared for name, unit in units_of(kind).items()}
+    for topic, kind in kinds.items():
+        prefix = "law_" if topic == "/state" else ""
+        own = {prefix + name: unit for name, unit in units_of(kind).items()}
+        found[topic] = found.get(topic, {}) | own
+    return found

@@ -1,0 +1,81 @@
+"""What the commands share: errors in one line and progress."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mjspace.log.reader import Log
+
+
+def open_log(path: Path) -> "Log":
+    """Return the log at ``path``; InputError when there is none, or nothing in it."""
+    from mjspace.errors import input_error_at
+    from mjspace.log.reader import Log
+
+    with input_error_at("log"):
+        log = Log(path)
+        log.require_periods()
+    return log
+
+
+@contextmanager
+def progress_bar(
+    total: float, doing: str, count: str = "{n:.1f}/{total:.1f} s "
+) -> Iterator[Callable[[float], None]]:
+    """Yield a function to call with the progress so far, of ``total``.
+
+    A bar is drawn after two seconds, where the output is a terminal.
+    """
+    from tqdm import tqdm
+
+    layout = "{desc} {percentage:3.0f}% |{bar}| " + count + "[{elapsed}<{remaining}]"
+    with tqdm(
+        total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout
+    ) as bar:
+        yield lambda reached: bar.update(reached - bar.n) and None
+
+
+@contextmanager
+def cause_shown(requested: bool) -> Iterator[None]:
+    """Print the traceback of an error's cause, if ``requested``, before the error is re-raised."""
+    try:
+        yield
+    except Exception as error:
+        if requested:
+            print_cause(error)
+        raise
+
+
+def print_cause(error: Exception) -> None:
+    """Print the traceback of what caused ``error``, of the error itself where nothing did."""
+    from traceback import print_exception
+
+    print_exception(error.__cause__ or error)
+
+
+@contextmanager
+def report_errors() -> Iterator[None]:
+    """Turn an error that the user can correct into one line and an exit status.
+
+    Any other exception is a fault of mjspace and is re-raised."""
+    try:
+        yield
+    except Exception as error:
+        status = _status(error)
+        if status is None:
+            raise
+        print(f"mjspace: {error}", file=sys.stderr)
+        sys.exit(status)
+
+
+def _status(error: Exception) -> int | None:
+    from mjspace.errors import FlightError, InputError, NoRendererError
+
+    if isinstance(error, InputError):
+        return 2
+    if isinstance(error, FlightError | NoRendererError | OSError):
+        return 1
+    return None
