@@ -51,7 +51,7 @@ ROOMS = {
 }
 # Outside packages that a few rooms alone may know.
 ONLY_IN = {
-    "mujoco": "vehicle environment simulation log rendering dm_env runner validation",
+    "mujoco": "vehicle environment actuators simulation log rendering dm_env runner validation",
     "mcap": "log",
     "dm_control": "dm_env",
     "dm_env": "dm_env",

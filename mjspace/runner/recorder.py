@@ -17,6 +17,7 @@ from mjspace.vehicle import vehicle
 
 FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
 
+# The actuators declare the units of what they command and measure themselves.
 UNITS = {
     "/truth": {
         "rate": "rad/s",
@@ -24,7 +25,6 @@ UNITS = {
         "gimbal_angle": "rad",
         "gimbal_rate": "rad/s",
         "wheel_angle": "rad",
-        "current": "A",
         "position": "m",
         "velocity": "m/s",
         "position_error": "m",
@@ -32,8 +32,6 @@ UNITS = {
         "altitude": "m",
         "ground_velocity": "m/s",
         "magnetic_field": "T",
-        "thrust": "N",
-        "propellant": "kg",
         "momentum": "N m s",
         "energy": "J",
         "attitude_error": "rad",
@@ -48,15 +46,12 @@ UNITS = {
         "gimbal_angle": "rad",
         "gimbal_rate": "rad/s",
         "wheel_angle": "rad",
-        "current": "A",
         "position": "m",
         "velocity": "m/s",
         "specific_force": "m/s^2",
         "altitude": "m",
         "ground_velocity": "m/s",
         "magnetic_field": "T",
-        "thrust": "N",
-        "propellant": "kg",
     },
     "/reference": {
         "rate": "rad/s",
@@ -67,20 +62,9 @@ UNITS = {
     },
     "/command": {
         "torque": "N m",
-        "wheel_torque": "N m",
-        "motor_torque": "N m",
         "gimbal_rate": "rad/s",
-        "thruster_torque": "N m",
-        "dipole": "A m^2",
-        "magnetic_moment": "A m^2",
-        "thrust": "N",
-        "gimbal": "rad",
-        "on_time": "s",
-        "thruster_thrust": "N",
         "acceleration": "rad/s^2",
         "load": "N m",
-        "voltage": "V",
-        "engine": "N m, N m, N",
     },
     "/law": {"angle": "rad", "angle_rate": "rad/s"},
     "/disturbance": {"force": "N", "torque": "N m"},
@@ -107,13 +91,14 @@ class Recorder:
             is_code = name.endswith(".py")
             media_type = "text/x-python" if is_code else "application/octet-stream"
             attachments[name] = (media_type, content)
+        own = assembly.actuators.units
         self._log = LogWriter(
             path,
             shapes(first),
             provenance.metadata(assembly.scenario, compiled, member),
             attachments,
             scene(model),
-            UNITS,
+            {t: UNITS.get(t, {}) | own.get(t, {}) for t in UNITS.keys() | own.keys()},
         )
         self._model, self._data = model, mujoco.MjData(model)
         self._stride = max(1, round(FRAME_PERIOD / assembly.scenario.rates.control))

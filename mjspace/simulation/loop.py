@@ -99,7 +99,7 @@ class _Flight:
             self.batch.expand(name)[:] = values
         if start.model:
             self.batch.set_const()
-        self.applied = assembly.actuators.inputs(self.batch, assembly.vehicle.motors)
+        self.applied = assembly.actuators.inputs(self.batch)
         self.deployments = assembly.deployed and assembly.deployed(self.batch)
         self.field = assembly.field
         if self.field is not None:
