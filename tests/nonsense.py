@@ -9,9 +9,10 @@ from functools import cache
 from typing import Any, get_args
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, RootModel
 
 from mjspace.scenario.construct import controllers
+from mjspace.scenario.equipment import type_of
 from mjspace.scenario.loading import load, scenario_names
 from mjspace.scenario.scenario import Component, Scenario
 
@@ -121,7 +122,7 @@ def _kinds_in(annotation: Any) -> Iterator[type[BaseModel]]:
         if annotation is not Component:
             yield annotation
             for field in annotation.model_fields.values():
-                yield from _kinds_in(field.annotation)
+                yield from _kinds_in(type_of(field))
         return
     for part in get_args(annotation):
         yield from _kinds_in(part)
@@ -130,7 +131,9 @@ def _kinds_in(annotation: Any) -> Iterator[type[BaseModel]]:
 def _models_in(value: Any) -> Iterator[BaseModel]:
     if isinstance(value, Component):
         return
-    if isinstance(value, BaseModel):
+    if isinstance(value, RootModel):
+        yield from _models_in(value.root)
+    elif isinstance(value, BaseModel):
         yield value
         for name in type(value).model_fields:
             yield from _models_in(getattr(value, name))

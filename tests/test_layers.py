@@ -39,7 +39,7 @@ ROOMS = {
     "plotting": "contract log scenario signals units",
     "rendering": "attitude contract environment errors log scenario vehicle",
     "simulation": "actuators attitude contract environment errors scenario sensors signals vehicle",
-    "runner": "contract errors log scenario signals simulation vehicle",
+    "runner": "contract errors log scenario signals simulation units vehicle",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "attitude constants contract environment log plotting runner scenario vehicle",
@@ -48,7 +48,7 @@ ROOMS = {
 }
 # Outside packages that a few rooms alone may know.
 ONLY_IN = {
-    "mujoco": "vehicle environment simulation log rendering dm_env runner validation",
+    "mujoco": "vehicle environment actuators simulation log rendering dm_env runner validation",
     "mcap": "log",
     "dm_control": "dm_env",
     "dm_env": "dm_env",

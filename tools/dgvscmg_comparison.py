@@ -14,11 +14,11 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from mjspace.actuators.pmsm import Pmsm
 from mjspace.contract import Array
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.plotting.style import COLORS, STYLE
-from mjspace.scenario.motors import Pmsm
 
 NAMES = ("CMG", "CMG, no vibration", "three wheels")
 PAGE = """# One double-gimbal CMG or three reaction wheels
@@ -106,7 +106,7 @@ def cmg(path: Path) -> Flown:
     """Return a flight of the CMG: motors of outer gimbal, inner gimbal and wheel."""
     log = Log(path)
     truth, command = log.read("/truth"), log.read("/command", ["motor_torque"])
-    drives = list(scenario_of(log).plant.drives.values())
+    drives = list(scenario_of(log).plant.drives.root.values())
     resistance = np.array([drive.resistance for drive in drives])
     torque = command["motor_torque"]
     speed = np.concatenate([truth["gimbal_rate"], truth["wheel_speed"]], axis=1)
@@ -169,7 +169,7 @@ def rms(values: Array) -> float:
 
 def main(flown: Path, quiet: Path, wheels: Path, page: Path) -> None:
     """Write the page and its figure beside it."""
-    motor = scenario_of(Log(flown)).plant.drives["cmg_wheel"]
+    motor = scenario_of(Log(flown)).plant.drives.root["cmg_wheel"]
     flights = [cmg(flown), cmg(quiet), reaction_wheels(wheels, motor)]
     drawn = page.with_suffix(".svg")
     figure(flights, drawn)

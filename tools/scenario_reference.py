@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mjspace.scenario.construct import controllers
+from mjspace.scenario.equipment import DeclaredIn, type_of
 from mjspace.scenario.fields import Si
 from mjspace.scenario.scenario import Scenario
 
@@ -47,7 +48,7 @@ def page() -> str:
         lines += [f"## {f'`{path}`' if path else 'At the top'}", "", _line(table.__doc__ or ""), ""]
         lines += ["| key | value | default | what |", "|---|---|---|---|"]
         for key, field in table.model_fields.items():
-            inner = _table_in(field.annotation)
+            inner = _table_in(type_of(field))
             what = _line(field.description or (inner.__doc__ if inner else "") or "")
             lines.append(f"| `{key}` | {_value(field)} | {_default(field)} | {what} |")
         lines.append("")
@@ -92,10 +93,10 @@ def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseM
     """Yield each table of a scenario with its TOML heading, in the order of the keys."""
     yield path, table
     for key, field in table.model_fields.items():
-        inner = _table_in(field.annotation)
+        inner = _table_in(type_of(field))
         if inner is not None:
             name = f"{path.strip('[]')}.{key}".lstrip(".")
-            many = get_origin(field.annotation)
+            many = get_origin(type_of(field))
             heading = {list: f"[[{name}]]", dict: f"[{name}.<name>]"}.get(many, f"[{name}]")
             yield from _tables(inner, heading)
 
@@ -108,11 +109,12 @@ def _table_in(annotation: Any) -> type[BaseModel] | None:
 
 def _value(field: FieldInfo) -> str:
     """Return what a key holds, as a person says it."""
-    annotation = field.annotation
+    annotation = type_of(field)
     if _table_in(annotation):
         many = {list: "tables", dict: "tables by name"}
         return many.get(get_origin(annotation), "table")
-    return _kind(Annotated[annotation, *field.metadata] if field.metadata else annotation)
+    marks = [mark for mark in field.metadata if not isinstance(mark, DeclaredIn)]
+    return _kind(Annotated[annotation, *marks] if marks else annotation)
 
 
 def _kind(annotation: Any) -> str:

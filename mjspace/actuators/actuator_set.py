@@ -1,56 +1,68 @@
-"""Actuators of several kinds side by side, each of which obeys its own field of the command."""
+"""Actuators of several kinds side by side, each of which obeys its own fields of the command."""
 
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mjspace.actuators.base import Actuators, State
-from mjspace.actuators.thrusters import Thrusters
+from mjspace.actuators.base import Actuator, Input, State
 from mjspace.contract import Array, Measurement
-from mjspace.environment.kernel import MOMENT
 from mjspace.errors import FlightError
-from mjspace.vehicle.indices import is_thruster
 
 
 @dataclass(frozen=True)
 class ActuatorSet:
     """All that acts on a batch of vehicles; the fields of their states have different names."""
 
-    kinds: tuple[Actuators, ...]
+    kinds: tuple[Actuator, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse kinds that would overwrite each other.
+
+        Raises:
+            ValueError: two kinds drive the same input, or are logged under the same name.
+        """
+        for one, other in combinations(self.kinds, 2):
+            names = f"{type(one).__name__} and {type(other).__name__}"
+            if _overlap(one.drives, other.drives):
+                raise ValueError(f"{names} both drive {_described(one.drives)}: give one")
+            if one.logged_as == other.logged_as:
+                raise ValueError(f"{names} are both logged as command.{one.logged_as}: give one")
 
     @property
     def stateful(self) -> bool:
         """Whether any must act in every integration step."""
         return any(kind.stateful for kind in self.kinds)
 
+    @property
+    def units(self) -> dict[str, dict[str, str]]:
+        """The SI units of what they command and measure, by topic and field of the log."""
+        command, measured = dict[str, str](), dict[str, str]()
+        for kind in self.kinds:
+            command |= {name: unit for name, (_, unit) in kind.takes.items()}
+            command[kind.logged_as] = kind.unit
+            measured |= kind.measures
+        return {"/command": command, "/truth": measured, "/measurement": measured}
+
     def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
         """Return each field of MuJoCo's model that burning changes, its body and the values.
 
         They are those in the middle of the integration step from ``before`` to ``after``.
         """
-        burning = [kind.masses(before, after) for kind in self.kinds if hasattr(kind, "masses")]
+        burning = [kind.masses(before, after) for kind in self.kinds]
         return [(name, *change) for masses in burning for name, change in masses.items()]
 
-    def inputs(self, batch: Any, motors: Sequence[str]) -> list[Array]:
+    def inputs(self, batch: Any) -> list[Array]:
         """Return, of each kind, what it fills: a view of an input of the ``batch``.
 
-        ``motors`` are the vehicle's: the thrusters' inputs are the last, the others' the first.
+        Raises:
+            ValueError: motors that do not stand side by side in ``ctrl``.
         """
-        thrusters = sum(map(is_thruster, motors))
-        views = []
-        for kind in self.kinds:
-            view = batch.bind(kind.acts_on)
-            part = slice(len(motors) - thrusters)
-            if kind.acts_on == "qfrc_applied":
-                part = slice(3, 6)  # the free joint comes first, its torque in body axes
-            elif kind.acts_on == "userdata":
-                part = MOMENT
-            elif isinstance(kind, Thrusters):
-                part = slice(view.shape[1] - thrusters, None)
-            views.append(view[:, part])
-        return views
+        return [batch.bind(kind.drives.array)[:, _columns(kind, batch)] for kind in self.kinds]
 
     def reset(self, vehicles: int) -> State:
         """Return the state of all at the start."""
@@ -59,34 +71,81 @@ class ActuatorSet:
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, tuple[Array, ...], Array]:
-        """Return (state, what each kind gives, saturated) as ``Actuators.act`` does.
+        """Return (state, what each kind applies, saturated) as ``Actuator.act`` does.
 
         Raises:
-            FlightError: a field of the command is missing or misshapen. What an actuator raises
-                itself is passed on as it is.
+            FlightError: a field of the command is missing or misshapen, or an actuator raises or
+                applies an array of another shape than that of its input.
         """
-        given, cut = [], []
+        applied, saturated = [], []
         for kind in self.kinds:
             _check(command, kind, len(truth.rate))
-            after, torque, saturated = kind.act(state, command, truth, step)
+            try:
+                after, output, cut = kind.act(state, command, truth, step)
+            except Exception as error:
+                raise _failure(kind, error) from error
+            if output.shape != (len(truth.rate), kind.drives.width):
+                raise FlightError(
+                    f"the actuator {type(kind).__name__} applies an array of shape {output.shape}: "
+                    f"it must be {(len(truth.rate), kind.drives.width)}"
+                )
             state = state | after
-            given.append(torque)
-            cut.append(saturated)
-        return state, tuple(given), np.concatenate(cut, axis=-1)
+            applied.append(output)
+            saturated.append(cut)
+        return state, tuple(applied), np.concatenate(saturated, axis=-1)
 
     def seen(self, state: State, truth: Measurement) -> Measurement:
-        """Return the truth with what the motors themselves show."""
+        """Return the truth with what the actuators' own sensors measure."""
         for kind in self.kinds:
-            truth = kind.seen(state, truth)
+            truth = kind.measured(state, truth)
         return truth
 
-    def logged(self, given: Sequence[tuple[Array, ...]]) -> dict[str, Array]:
-        """Return the fields of /command for what ``act`` gave in several periods."""
-        columns = zip(*given, strict=True)
+    def logged(self, applied: Sequence[tuple[Array, ...]]) -> dict[str, Array]:
+        """Return the fields of /command for what ``act`` applied in several periods."""
+        columns = zip(*applied, strict=True)
         return {k.logged_as: np.array(c) for k, c in zip(self.kinds, columns, strict=True)}
 
 
-def _check(command: Any, kind: Actuators, vehicles: int) -> None:
+def _columns(kind: Actuator, batch: Any) -> slice:
+    """Return the columns that ``kind`` fills in its array."""
+    names = kind.drives.motors
+    if not names:
+        return slice(kind.drives.columns.start, kind.drives.columns.stop)
+    ids = [batch.actuator(name).id for name in names]
+    if ids != list(range(ids[0], ids[0] + len(ids))):
+        raise ValueError(
+            f"the motors of {type(kind).__name__} must stand side by side and in order in ctrl: "
+            f"{dict(zip(names, ids, strict=True))}"
+        )
+    return slice(ids[0], ids[-1] + 1)
+
+
+def _overlap(one: Input, other: Input) -> bool:
+    """Return whether the two inputs share a number."""
+    if one.array != other.array:
+        return False
+    if set(one.motors) & set(other.motors):
+        return True
+    return bool(set(one.columns) & set(other.columns))
+
+
+def _described(driven: Input) -> str:
+    if driven.motors:
+        return f"the motors {', '.join(driven.motors)}"
+    return f"{driven.array}[{driven.columns.start}:{driven.columns.stop}]"
+
+
+def _failure(kind: Actuator, error: Exception) -> FlightError:
+    """Return the error that says which actuator raised what, and in which line."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{Path(frame.filename).name}:{frame.lineno}"
+    return FlightError(
+        f"the actuator {type(kind).__name__} ({kind.logged_as}) raised {type(error).__name__} at "
+        f"{place}: {error}"
+    )
+
+
+def _check(command: Any, kind: Actuator, vehicles: int) -> None:
     """Raise FlightError where the law's ``command`` lacks a field that ``kind`` obeys.
 
     Every field has the vehicle axis first, as the log has.

@@ -1,100 +1,158 @@
-"""Actuators: what a command makes the motors do; here those without any dynamics or limits."""
+"""What an actuator is: a table that a scenario fills in, and the kind of actuator built from it."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
 from mjspace.contract import Array, Measurement
+from mjspace.environment.kernel import MOMENT
+from mjspace.scenario.equipment import Driven, Equipment
+from mjspace.scenario.plant import Initial, Rates
+from mjspace.vehicle.vehicle import Vehicle
 
 State = dict[str, Array]
 """What actuators remember, vehicle axis first."""
-Fields = dict[str, tuple[int | tuple[int, ...], str]]
+Fields = Mapping[str, tuple[int | tuple[int, ...], str]]
 """Fields of a command by name: shape for one vehicle, and unit."""
 Limits = dict[str, tuple[Array, Array]]
 """Least and largest of fields of a command by name, each of the shape for one vehicle."""
 
 
-class Actuators(Protocol):
-    """The motors of a batch of vehicles: all memory in ``State``.
+@dataclass(frozen=True)
+class Input:
+    """What an actuator drives: some columns of one of MuJoCo's arrays."""
 
-    Actuators that burn what they carry have a method ``masses(before, after)`` as well: for each
-    field of MuJoCo's model that has changed, the body and the vehicles' values, (N, ...), in the
-    middle of the integration step between these two states; and may have
-    ``account_propellant(state, given, instead, step)``, which accounts for what is burnt where
-    faults make them give ``instead``.
+    array: str
+    """MuJoCo's name of the array."""
+    motors: tuple[str, ...] = ()
+    """Of ``ctrl``: the motors by name, in the order of what is applied."""
+    columns: range = range(0)
+    """Of any other array."""
+
+    @property
+    def width(self) -> int:
+        """How many numbers are applied to one vehicle."""
+        return len(self.motors) or len(self.columns)
+
+
+def motors(names: Iterable[str]) -> Input:
+    """Return the motors of these names in ``ctrl``, where they stand side by side."""
+    return Input("ctrl", tuple(names))
+
+
+# The free joint comes first in qfrc_applied: force in inertial axes, then torque in body axes.
+BUS_TORQUE = Input("qfrc_applied", columns=range(3, 6))
+"""The torque on the bus [N m], body axes."""
+DIPOLE = Input("userdata", columns=range(MOMENT.start, MOMENT.stop))
+"""The vehicle's magnetic moment [A m^2], body axes, in the environment's field."""
+
+
+class Actuator(ABC):
+    """One kind of actuator of a batch of vehicles; all memory is in ``State``.
+
+    A subclass is a frozen dataclass. Arrays have the vehicle axis first, (N, ...).
     """
 
     logged_as: ClassVar[str]
-    """The field of /command that their torques are logged under."""
+    """The field of /command that what it applies is logged under."""
+    unit: ClassVar[str]
+    """Of that field."""
+    measures: ClassVar[Mapping[str, str]] = {}
+    """The fields of ``Measurement`` that ``measured`` fills in, with their units."""
 
     @property
+    @abstractmethod
     def takes(self) -> Fields:
-        """The fields of a command, each with its length for one vehicle and its unit."""
+        """The fields of a command that it obeys."""
 
-    acts_on: ClassVar[str]
-    """MuJoCo's array that ``act`` fills: "ctrl", "qfrc_applied" for the bus's torque, or "userdata"
-    for its magnetic moment [A m^2], body axes, in the environment's field."""
+    @property
+    @abstractmethod
+    def drives(self) -> Input:
+        """What it drives."""
 
     @property
     def stateful(self) -> bool:
-        """Whether they must act in every integration step; else once in a control period."""
+        """Whether it must act in every integration step; else once in a control period."""
+        return False
 
     def reset(self, vehicles: int) -> State:
-        """Return the state at the start."""
+        """Return its state at the start."""
+        return {}
 
     def limits(self) -> Limits:
         """Return the least and the largest of each field that it takes, infinite where unlimited.
 
         They bound what can be applied; a command beyond them is not refused.
         """
+        found = {}
+        for name, (shape, _) in self.takes.items():
+            largest = np.full(shape, np.inf)
+            found[name] = (-largest, largest)
+        return found
 
+    @abstractmethod
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
-        """Return (state, torque, saturated) for ``step`` [s] from now; arrays (N, m).
+        """Return (state, applied, saturated) for ``step`` [s] from now.
 
-        ``torque`` [N m] is on what each turns, ``saturated`` 1.0 for one that does not do as it is
-        told.
+        ``applied`` (N, width) is held over the step in what it ``drives``; ``saturated``, (N,
+        motors), is 1.0 for a motor that cannot follow its command, else 0.0.
         """
 
-    def seen(self, state: State, truth: Measurement) -> Measurement:
-        """Return the truth with what the motors themselves show."""
+    def measured(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth with what sensors of the actuator's own measure of it."""
+        return truth
+
+    def masses(self, before: State, after: State) -> dict[str, tuple[int, Array]]:
+        """Return, for each field of MuJoCo's model that burning changes, the body and its values.
+
+        They are the vehicles', (N, ...), in the middle of the integration step that leads from
+        ``before`` to ``after``: with them a constant thrust gives Tsiolkovsky's velocity to second
+        order.
+        """
+        return {}
+
+    def account_propellant(
+        self, state: State, applied: Array, instead: Array, step: float
+    ) -> tuple[State, Array]:
+        """Return (state, applied) where faults have made ``instead`` of what ``act`` applied."""
+        return state, instead
 
 
 @dataclass(frozen=True)
-class IdealThrusters:
-    """Thrusters of which nothing is modelled but their torque, which is what the law asks for."""
+class Context:
+    """What an actuator may know of the vehicle and the flight that it is built for."""
 
-    obeys: str = "torque"
-    """The field of the command."""
+    vehicle: Vehicle
+    driven: Driven
+    """What its own table drives."""
+    rates: Rates
+    initial: Initial
+    gravity: float = 0.0
+    """Central gravity where the vehicle starts [m/s^2]; 0 without."""
+    inner: bool = False
+    """Whether the law's inner loop commands it, anew in every integration step."""
+    before: tuple[Actuator, ...] = ()
+    """The vehicle's actuators whose keys come before its own."""
+    alone: bool = True
+    """Whether the vehicle has no other actuator."""
 
-    logged_as: ClassVar[str] = "thruster_torque"
-    acts_on: ClassVar[str] = "qfrc_applied"
-    stateful: ClassVar[bool] = False
 
-    @property
-    def takes(self) -> Fields:
-        """The fields of a command."""
-        return {self.obeys: (3, "N m")}
+class ActuatorTable(Equipment, ABC):
+    """Base of an actuator's table in [plant]."""
 
-    def reset(self, vehicles: int) -> State:
-        """Return no state."""
+    @abstractmethod
+    def actuator(self, context: Context) -> Actuator:
+        """Return the actuator.
+
+        Raises:
+            ValueError: it cannot be built.
+        """
+
+    def facts(self, vehicle: Vehicle) -> dict[str, Any]:
+        """Return what a law that leaves out a gain of that name takes from the vehicle."""
         return {}
-
-    def limits(self) -> Limits:
-        """Return no limits."""
-        largest = np.full(3, np.inf)
-        return {self.obeys: (-largest, largest)}
-
-    def act(
-        self, state: State, command: Any, truth: Measurement, step: float
-    ) -> tuple[State, Array, Array]:
-        """Return the torque that is asked for, body axes, (N, 3); nothing is ever cut."""
-        asked = getattr(command, self.obeys)
-        torque = np.asarray(asked, dtype=float).reshape(truth.rate.shape)
-        return state, torque, np.zeros((len(torque), 0))
-
-    def seen(self, state: State, truth: Measurement) -> Measurement:
-        """Return the truth: thrusters show nothing."""
-        return truth

@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.actuators.base import Actuators, State
-from mjspace.actuators.thrusters import Thrusters
+from mjspace.actuators.base import Actuator, State
 from mjspace.contract import TICK, Array, Event
 from mjspace.errors import input_error_at, nearest
 from mjspace.scenario.faults import Fault
 from mjspace.sensors.noise import normals
 from mjspace.signals import find_signal, magnitude
 from mjspace.units import whole_number
-from mjspace.vehicle.indices import is_thruster
 
 STREAM = 1000
 """First number of the faults' random streams; the sensors' are the fields of ``Measurement``."""
@@ -45,8 +43,7 @@ class FaultSet:
     def __init__(
         self,
         tables: Sequence[Fault],
-        kinds: Sequence[Actuators],
-        motors: Sequence[str],
+        kinds: Sequence[Actuator],
         hold: float,
         seed: int,
         members: Sequence[int],
@@ -58,7 +55,7 @@ class FaultSet:
         """
         self._tables, self._kinds, self._hold = tables, kinds, hold
         self._vehicles = len(members)
-        known = _places(kinds, motors)
+        known = _places(kinds)
         self._places, self._noises = [], []
         self._lengths = []  # of what is remembered of each
         for number, fault in enumerate(tables):
@@ -136,10 +133,9 @@ class FaultSet:
             changed[:, place.columns] = np.where(in_force[:, None], wrong, right)
             result[place.kind] = changed
         for number, kind in enumerate(self._kinds):
-            if hasattr(kind, "account_propellant"):
-                state, result[number] = kind.account_propellant(
-                    state, given[number], result[number], self._hold
-                )
+            state, result[number] = kind.account_propellant(
+                state, given[number], result[number], self._hold
+            )
         return state, tuple(result)
 
     def _wrong(self, number: int, right: Array, past: Array | None, index: int) -> Array:
@@ -169,16 +165,14 @@ class FaultSet:
         return fault.when.admits(magnitude(rows[:, part]))
 
 
-def _places(kinds: Sequence[Actuators], motors: Sequence[str]) -> dict[str, _Place]:
-    """Return the motors by each name that they have."""
-    pushing = [name for name in motors if is_thruster(name)]
-    turning = [name for name in motors if not is_thruster(name)]
+def _places(kinds: Sequence[Actuator]) -> dict[str, _Place]:
+    """Return the motors by each name that they have: their own, or as /command has them."""
     known = {}
     for number, kind in enumerate(kinds):
-        names = pushing if isinstance(kind, Thrusters) else turning
-        if kind.acts_on != "ctrl":
-            names = [""] * 3  # of a torque or moment on the bus: its axes
-        for column, name in enumerate(names):
-            known[name] = known[f"{kind.logged_as}[{column}]"] = _Place(number, [column])
-        known[kind.logged_as] = _Place(number, list(range(len(names))))
-    return {name: place for name, place in known.items() if name}
+        columns = range(kind.drives.width)
+        for column, name in zip(columns, kind.drives.motors, strict=False):
+            known[name] = _Place(number, [column])
+        for column in columns:
+            known[f"{kind.logged_as}[{column}]"] = _Place(number, [column])
+        known[kind.logged_as] = _Place(number, list(columns))
+    return known

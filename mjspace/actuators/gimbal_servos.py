@@ -1,47 +1,104 @@
 """Speed loops on gimbals and on the wheels in them: rates in, torques on joints out."""
 
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numba import guvectorize
 
-from mjspace.actuators.base import Fields, State
+from mjspace.actuators.base import (
+    Actuator,
+    ActuatorTable,
+    Context,
+    Fields,
+    Input,
+    State,
+    motors,
+)
+from mjspace.actuators.driven_hinges import gimbals_and_wheels, motor_order
 from mjspace.contract import Array, Measurement
-from mjspace.scenario.servos import Servos
+from mjspace.scenario.equipment import Driven
+from mjspace.scenario.fields import Finite, NonNegative, Positive, Si, Table
+from mjspace.vehicle import indices
 from mjspace.vehicle.vehicle import Vehicle
 
 
+class Servos(ActuatorTable, Table):
+    """Speed loops on every hinge of the parts that has a motor: gimbals alike, and wheels alike.
+
+    A hinge whose name ends in ``wheel`` is a wheel, any other a gimbal. A loop is proportional and
+    integral, and its motor acts against what carries the hinge.
+    """
+
+    excludes: ClassVar[tuple[str, ...]] = ("engine", "wheels")
+
+    rate_limit: Annotated[Positive, Si("rad/s")] | None = None
+    """Fastest rate that a gimbal is commanded; none when left out."""
+    torque_limit: Annotated[Positive, Si("N m")] | None = None
+    """Largest torque of a gimbal's motor; none when left out."""
+    rate_gain: Annotated[Positive, Si("N m s/rad")] = 0.8
+    """Torque of a gimbal's motor for each rad/s of rate error."""
+    integral_gain: Annotated[NonNegative, Si("N m/rad")] = 60.0
+    """And for each rad of integrated error."""
+    wheel_speed: Annotated[Finite, Si("rad/s")]
+    """Held, relative to the gimbal; where a wheel starts is ``initial.wheel_speed``."""
+    wheel_torque_limit: Annotated[Positive, Si("N m")] | None = None
+    """Largest torque of a wheel's motor; none when left out."""
+    wheel_gain: Annotated[Positive, Si("N m s/rad")] = 0.1
+    """Torque of a wheel's motor for each rad/s of speed error."""
+    wheel_integral_gain: Annotated[NonNegative, Si("N m/rad")] = 0.5
+    """And for each rad of integrated error."""
+
+    def driven(self, model: Any) -> Driven:
+        """Return every hinge of the parts that a motor turns, but for those of booms."""
+        return gimbals_and_wheels(indices.turned(model))
+
+    def facts(self, vehicle: Vehicle) -> dict[str, Any]:
+        """Return the axes of gimbals and wheels at rest, and the wheels' axial inertia."""
+        return {
+            "gimbal_axes": indices.axes(vehicle.model, vehicle.gimbal_dof),
+            "spin_axes": indices.axes(vehicle.model, vehicle.wheel_dof),
+            "wheel_inertia": indices.axial_inertia(vehicle.model, vehicle.wheel_dof),
+        }
+
+    def actuator(self, context: Context) -> "GimbalServos":
+        """Return the loops of a vehicle's driven hinges."""
+        gimbal = [self.rate_gain, self.integral_gain, self.torque_limit, self.rate_limit]
+        wheel = [self.wheel_gain, self.wheel_integral_gain, self.wheel_torque_limit, None]
+        driven = context.driven
+        rows = [gimbal] * len(driven.gimbals) + [wheel] * len(driven.wheels)
+        loops = [[np.inf if number is None else number for number in row] for row in rows]
+        wheel_speed = np.full(len(driven.wheels), self.wheel_speed)
+        return GimbalServos(np.array(loops), wheel_speed, driven)
+
+
 @dataclass(frozen=True)
-class GimbalServos:
+class GimbalServos(Actuator):
     """Gimbals that obey a ``GimbalRateCommand``, and wheels that keep their speed.
 
     A motor's torque is held for an integration step, and has its reaction on what carries the
-    hinge. The integral of a loop waits while its motor gives all it can.
+    hinge. The integral of a loop is frozen while its motor saturates.
     """
 
     loops: Array
     """Gain, integral gain, limits of torque and rate of each gimbal, then each wheel; (m, 4)."""
     wheel_speed: Array
-    """Wanted of each wheel [rad/s], shape (n,)."""
-    order: Any
+    """Desired of each wheel [rad/s], shape (n,)."""
+    driven: Driven
+    order: Any = field(init=False, repr=False)
     """Where each motor's hinge is among gimbals and wheels, shape (m,)."""
 
     logged_as: ClassVar[str] = "motor_torque"
-    acts_on: ClassVar[str] = "ctrl"
+    unit: ClassVar[str] = "N m"
     stateful: ClassVar[bool] = True
 
-    @classmethod
-    def of(cls, vehicle: Vehicle, table: Servos) -> Self:
-        """Return the loops of a vehicle's driven hinges."""
-        gimbal = [table.rate_gain, table.integral_gain, table.torque_limit, table.rate_limit]
-        wheel = [table.wheel_gain, table.wheel_integral_gain, table.wheel_torque_limit, None]
-        gimbals, wheels = len(vehicle.gimbal_dof), len(vehicle.wheel_dof)
-        rows = [gimbal] * gimbals + [wheel] * wheels
-        loops = [[np.inf if number is None else number for number in row] for row in rows]
-        sensed = [*vehicle.gimbal_dof, *vehicle.wheel_dof]
-        order = [sensed.index(dof) for dof in vehicle.drive_dof]
-        return cls(np.array(loops), np.full(wheels, table.wheel_speed), np.array(order))
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "order", motor_order(self.driven))
+
+    @property
+    def drives(self) -> Input:
+        """The hinges' motors."""
+        return motors(self.driven.motors)
 
     @property
     def takes(self) -> Fields:
@@ -60,19 +117,15 @@ class GimbalServos:
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
-        """Return (state, torque [N m], whether rate or torque is cut), (N, m), in motors' order."""
+        """Return (state, torque [N m], whether rate or torque saturates), (N, m), as the motors."""
         gimbal_rate = np.asarray(command.gimbal_rate, dtype=float).reshape(truth.gimbal_rate.shape)
         wheel_speed = np.broadcast_to(self.wheel_speed, truth.wheel_speed.shape)
-        wanted = np.concatenate([gimbal_rate, wheel_speed], axis=-1)
+        desired = np.concatenate([gimbal_rate, wheel_speed], axis=-1)
         rate = np.concatenate([truth.gimbal_rate, truth.wheel_speed], axis=-1)
         before = state["servo_integral"]
-        integral, torque, cut = _hold_speed.ufunc(before, wanted, rate, self.loops, step)
-        in_order = torque.take(self.order, axis=-1), cut.take(self.order, axis=-1)
+        integral, torque, saturated = _hold_speed.ufunc(before, desired, rate, self.loops, step)
+        in_order = torque.take(self.order, axis=-1), saturated.take(self.order, axis=-1)
         return {"servo_integral": integral}, *in_order
-
-    def seen(self, state: State, truth: Measurement) -> Measurement:
-        """Return the truth: the hinges' angles and rates are in it."""
-        return truth
 
 
 @guvectorize(
@@ -81,15 +134,22 @@ class GimbalServos:
     cache=True,
 )
 def _hold_speed(
-    before: Any, wanted: Any, rate: Any, loops: Any, step: Any, after: Any, torque: Any, cut: Any
+    before: Any,
+    desired: Any,
+    rate: Any,
+    loops: Any,
+    step: Any,
+    after: Any,
+    torque: Any,
+    saturated: Any,
 ) -> None:
     for i in range(rate.size):
         gain, integral_gain, torque_limit, rate_limit = loops[i]
-        goal = min(max(wanted[i], -rate_limit), rate_limit)
+        goal = min(max(desired[i], -rate_limit), rate_limit)
         error = goal - rate[i]
         integral = before[i] + error * step
-        asked = gain * error + integral_gain * integral
-        torque[i] = min(max(asked, -torque_limit), torque_limit)
-        full = torque[i] != asked
-        after[i] = before[i] if full and error * asked > 0.0 else integral
-        cut[i] = 1.0 if full or goal != wanted[i] else 0.0
+        commanded = gain * error + integral_gain * integral
+        torque[i] = min(max(commanded, -torque_limit), torque_limit)
+        full = torque[i] != commanded
+        after[i] = before[i] if full and error * commanded > 0.0 else integral
+        saturated[i] = 1.0 if full or goal != desired[i] else 0.0

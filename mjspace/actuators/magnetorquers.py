@@ -2,20 +2,46 @@
 
 from dataclasses import dataclass, field
 from math import exp, inf
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numba import guvectorize
+from pydantic import Field
 
-from mjspace.actuators.base import Fields, State
+from mjspace.actuators.base import (
+    DIPOLE,
+    Actuator,
+    ActuatorTable,
+    Context,
+    Fields,
+    Input,
+    State,
+)
 from mjspace.contract import Array, Measurement
+from mjspace.scenario.fields import Positive, Si, Table, Time, Unit3
+
+
+class Magnetorquers(ActuatorTable, Table):
+    """Coils whose magnetic moment the Earth's field turns: one for each axis, all alike."""
+
+    axes: Annotated[list[Unit3], Field(min_length=1)] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    """Axes of the coils in body axes, one row for each; normalized."""
+    dipole_limit: Annotated[Positive, Si("A m^2")] | None = None
+    """Largest magnetic moment of each; none when left out."""
+    time_constant: Time = 0.0
+    """With which the moment follows its command."""
+
+    def actuator(self, context: Context) -> "CoilSet":
+        """Return the coils."""
+        axes = np.array(self.axes) / np.linalg.norm(self.axes, axis=1, keepdims=True)
+        return CoilSet(axes, self.dipole_limit or inf, self.time_constant)
 
 
 @dataclass(frozen=True)
-class CoilSet:
+class CoilSet(Actuator):
     """Coils that are all alike, with a pseudo-inverse allocation.
 
-    What they give is the moment; its torque, moment x field, is the environment's, and changes
+    They apply the moment; its torque, moment x field, is the environment's, and changes
     with the attitude in every stage of the integrator.
     """
 
@@ -26,8 +52,9 @@ class CoilSet:
     time_constant: float = 0.0
     """With which each follows its command [s]."""
     logged_as: ClassVar[str] = "magnetic_moment"
+    unit: ClassVar[str] = "A m^2"
     takes: ClassVar[Fields] = {"dipole": (3, "A m^2")}
-    acts_on: ClassVar[str] = "userdata"
+    drives: ClassVar[Input] = DIPOLE
     allocation: Array = field(init=False, repr=False)
     """Moments of the coils for each unit of the whole, shape (n, 3)."""
 
@@ -54,9 +81,9 @@ class CoilSet:
     ) -> tuple[State, Array, Array]:
         """Return (state, moment on the whole, nothing) for ``step`` [s]; moment (N, 3), body axes.
 
-        Of all that would give the command's ``dipole``, the moments are those of least norm, each
-        then cut to the limit and, where it lags, the mean over the step. A cut is no event: it is
-        how the B-dot law works.
+        Of all that make the command's ``dipole``, the moments are those of least norm, each then
+        limited and, where it lags, the mean over the step. Saturation is not reported as an event:
+        it is how the B-dot law works.
         """
         before = state.get("coil_moment", np.zeros((len(truth.rate), len(self.axes))))
         kept = exp(-step / self.time_constant) if self.stateful else 0.0
@@ -66,10 +93,6 @@ class CoilSet:
         )
         return {"coil_moment": after} if self.stateful else {}, moment, np.zeros((len(moment), 0))
 
-    def seen(self, state: State, truth: Measurement) -> Measurement:
-        """Return the truth: coils show nothing."""
-        return truth
-
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
 @guvectorize(
@@ -78,17 +101,17 @@ class CoilSet:
     cache=True,
 )
 def _moments(
-    wanted: Any, before: Any, allocation: Any, axes: Any, how: Any, after: Any, moment: Any
+    commanded: Any, before: Any, allocation: Any, axes: Any, how: Any, after: Any, moment: Any
 ) -> None:
     limit, kept, mean = how[0], how[1], how[2]
-    for k in range(wanted.size):
+    for k in range(commanded.size):
         moment[k] = 0.0
     for i in range(before.size):
         target = 0.0
-        for k in range(wanted.size):
-            target += allocation[i, k] * wanted[k]
+        for k in range(commanded.size):
+            target += allocation[i, k] * commanded[k]
         target = min(max(target, -limit), limit)
         after[i] = target + (before[i] - target) * kept
-        given = target + (before[i] - target) * mean
-        for k in range(wanted.size):
-            moment[k] += axes[i, k] * given
+        applied = target + (before[i] - target) * mean
+        for k in range(commanded.size):
+            moment[k] += axes[i, k] * applied

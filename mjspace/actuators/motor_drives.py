@@ -1,36 +1,78 @@
 """Electric motors on hinges, as the actuators of a vehicle: voltages in, torques on joints out."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
+from pydantic import ConfigDict, RootModel
 
-from mjspace.actuators.base import Fields, State
-from mjspace.actuators.pmsm import Drives
+from mjspace.actuators.base import (
+    Actuator,
+    ActuatorTable,
+    Context,
+    Fields,
+    Input,
+    State,
+    motors,
+)
+from mjspace.actuators.driven_hinges import gimbals_and_wheels, motor_order
+from mjspace.actuators.pmsm import Drives, Pmsm
 from mjspace.contract import Array, Measurement
-from mjspace.scenario.motors import Pmsm
-from mjspace.vehicle.vehicle import Vehicle
+from mjspace.scenario.equipment import Driven
+from mjspace.scenario.fields import Name
+from mjspace.vehicle import indices
+
+
+class DriveTables(ActuatorTable, RootModel[dict[Name, Pmsm]]):
+    """The motors of a vehicle, by the hinge that each turns."""
+
+    model_config = ConfigDict(frozen=True)
+    excludes: ClassVar[tuple[str, ...]] = ("servos", "engine", "wheels")
+
+    @property
+    def fitted(self) -> bool:
+        """Whether there are any."""
+        return bool(self.root)
+
+    def driven(self, model: Any) -> Driven:
+        """Return the motors in the order of ``ctrl``; each hinge with a motor has its drive."""
+        turned = indices.turned(model)
+        for name in self.root:
+            if name not in turned:
+                raise ValueError(
+                    f"plant.drives.{name}: no motor turns it: have {', '.join(turned)}"
+                )
+        if left := set(turned).difference(self.root):
+            raise ValueError(f"plant.drives: {', '.join(sorted(left))} has a motor and no drive")
+        return gimbals_and_wheels(turned)
+
+    def actuator(self, context: Context) -> "MotorDrives":
+        """Return the drives of a vehicle's driven hinges."""
+        tables = [self.root[name] for name in context.driven.motors]
+        return MotorDrives(Drives.of(tables), context.driven)
 
 
 @dataclass(frozen=True)
-class MotorDrives:
+class MotorDrives(Actuator):
     """Synchronous motors with their currents; each pushes against what carries its rotor."""
 
-    drives: Drives
-    order: Any
+    electrical: Drives
+    driven: Driven
+    order: Any = field(init=False, repr=False)
     """Where each motor's speed is among gimbal rates and wheel speeds, shape (m,)."""
 
     logged_as: ClassVar[str] = "motor_torque"
-    acts_on: ClassVar[str] = "ctrl"
+    unit: ClassVar[str] = "N m"
+    measures: ClassVar[dict[str, str]] = {"current": "A"}
     stateful: ClassVar[bool] = True
 
-    @classmethod
-    def of(cls, vehicle: Vehicle, tables: Sequence[Pmsm]) -> Self:
-        """Return the drives of a vehicle's driven hinges; ``tables`` are in their order."""
-        sensed = [*vehicle.gimbal_dof, *vehicle.wheel_dof]
-        order = [sensed.index(dof) for dof in vehicle.drive_dof]
-        return cls(Drives.of(tables), np.array(order))
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "order", motor_order(self.driven))
+
+    @property
+    def drives(self) -> Input:
+        """The hinges' motors."""
+        return motors(self.driven.motors)
 
     @property
     def takes(self) -> Fields:
@@ -43,23 +85,23 @@ class MotorDrives:
 
     def limits(self) -> dict[str, tuple[Array, Array]]:
         """Return the supplies' voltages."""
-        longest = np.repeat(self.drives.voltage_limit[:, None], 2, axis=1)
+        longest = np.repeat(self.electrical.voltage_limit[:, None], 2, axis=1)
         return {"voltage": (-longest, longest)}
 
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
-        """Return (state, mean torque of the step [N m], whether the voltage was cut)."""
+        """Return (state, mean torque of the step [N m], whether the voltage saturates)."""
         speeds = np.concatenate([truth.gimbal_rate, truth.wheel_speed], axis=-1)
         angles = np.concatenate([truth.gimbal_angle, truth.wheel_angle], axis=-1)
         # Half the time of an index array.
         speed, angle = speeds.take(self.order, axis=-1), angles.take(self.order, axis=-1)
-        current, torque, applied = self.drives.advance(
+        current, torque, applied = self.electrical.advance(
             state["current"], command.voltage, speed, step, angle
         )
-        cut = (applied != command.voltage).any(axis=-1)
-        return {"current": current}, torque, cut
+        saturated = (applied != command.voltage).any(axis=-1)
+        return {"current": current}, torque, saturated
 
-    def seen(self, state: State, truth: Measurement) -> Measurement:
+    def measured(self, state: State, truth: Measurement) -> Measurement:
         """Return the truth with the motors' currents."""
         return truth._replace(current=state["current"])

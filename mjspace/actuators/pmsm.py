@@ -15,13 +15,32 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numba
 import numpy as np
+from pydantic import Field
 
 from mjspace.contract import Array
-from mjspace.scenario.motors import Pmsm
+from mjspace.scenario.fields import Positive, Si, Table
+
+
+class Pmsm(Table):
+    """A permanent-magnet synchronous motor, as two windings at right angles."""
+
+    pole_pairs: Annotated[int, Field(ge=1, strict=True)]
+    """Electrical turns in one of the rotor."""
+    resistance: Annotated[Positive, Si("ohm")]
+    """Of each winding."""
+    inductance: Annotated[Positive, Si("H")]
+    """Of each winding."""
+    torque_constant: Annotated[Positive, Si("N m/A")]
+    """Torque for each ampere across the rotor's field; the same number is the back-EMF in V s."""
+    axes: Literal["rotor", "stator"] = "rotor"
+    """In which its voltages are commanded, held from step to step, and its currents measured: those
+    of the rotor take a sensor of its angle; the stator's are of the two windings themselves."""
+    voltage_limit: Annotated[Positive, Si("V")] | None = None
+    """Longest voltage vector that the supply gives; none when left out."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +56,7 @@ class Drives:
     torque_constant: Array
     """k_m [N m/A], which is also the back-EMF [V s/rad], shape (m,)."""
     voltage_limit: Array
-    """Longest voltage vector that the supply gives [V], shape (m,)."""
+    """Longest voltage vector of the supply [V], shape (m,)."""
     windings: Array
     """Whose voltages and currents are those of the windings, in the stator's axes: 1.0, else 0.0;
     shape (m,)."""
@@ -64,9 +83,9 @@ class Drives:
     ) -> tuple[Array, Array, Array]:
         """Return (current, torque, voltage applied) over a ``step`` [s] of integration.
 
-        ``current`` (..., m, 2) is (I_d, I_q) [A], given at the step's start and returned at its
-        end; ``voltage`` (..., m, 2) is (u_d, u_q) [V]; both are the windings' where ``windings``
-        says so. ``speed`` (..., m) is the rotor's relative to its stator [rad/s], ``angle``
+        ``current`` (..., m, 2) is (I_d, I_q) [A], of the step's start and, returned, of its end;
+        ``voltage`` (..., m, 2) is (u_d, u_q) [V]; both are the windings' where ``windings`` says
+        so. ``speed`` (..., m) is the rotor's relative to its stator [rad/s], ``angle``
         (..., m) that of its start [rad], which matters to windings alone. ``torque`` (..., m) is
         the mean over the step [N m], on the rotor, whose reaction is on the stator's body.
         ``voltage applied`` (..., m, 2) is the voltage cut to the supply's limit in length, not in
@@ -74,10 +93,10 @@ class Drives:
         """
         if angle is None:
             angle = np.full(np.shape(speed), np.nan)
-        given: tuple[Array, Array, Array] = _advance.ufunc(
+        result: tuple[Array, Array, Array] = _advance.ufunc(
             current, voltage, speed, angle, self._constants, step
         )
-        return given
+        return result
 
     def to_stator(self, vector: Array, angle: Array) -> Array:
         """Return the two windings' currents or voltages (..., m, 2): Park's transform undone.

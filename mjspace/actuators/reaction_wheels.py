@@ -3,22 +3,173 @@
 import warnings
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
+import mujoco
 import numba
 import numpy as np
+from pydantic import model_validator
 
-from mjspace.actuators.base import Fields, State
+from mjspace.actuators.base import (
+    Actuator,
+    ActuatorTable,
+    Context,
+    Fields,
+    Input,
+    State,
+    motors,
+)
 from mjspace.contract import Array, Measurement
-from mjspace.vehicle import model_checks, stability
-from mjspace.vehicle.vehicle import Vehicle
+from mjspace.scenario.equipment import Driven
+from mjspace.scenario.fields import Meters3, Positive, Si, Unit3
+from mjspace.scenario.hinges import Bearing, Friction
+from mjspace.vehicle import mass_properties, model_checks, stability
+from mjspace.vehicle.composition import ASSETS
 
 MISSED = 1e-9, 1e-12
 """Rounding where no wheel gives any torque: part of the commanded torque, and N m."""
+_GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
+
+
+class Wheels(ActuatorTable, Bearing):
+    """Reaction wheels: one for each axis; every wheel is alike."""
+
+    cure: ClassVar[str] = "set wheels.axes = [] to fly without wheels"
+    before_parts: ClassVar[bool] = True
+
+    axes: list[Unit3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    """Spin axes in body axes, one row for each wheel; normalized. None: ``[]``."""
+    positions: list[Meters3] | None = None
+    """Rotor centres in the body [m]; the centre of mass when left out."""
+    inertia: Annotated[Positive, Si("kg m^2")] = 0.05
+    """Axial rotor inertia."""
+    transverse_inertia: Annotated[Positive, Si("kg m^2")] | None = None
+    """Transverse rotor inertia; half the axial when left out."""
+    mass: Annotated[Positive, Si("kg")] = 2.0
+    """Rotor mass."""
+    torque_limit: Annotated[Positive, Si("N m")] | None = None
+    """Largest motor torque; none when left out."""
+    speed_limit: Annotated[Positive, Si("rad/s")] | None = None
+    """Largest speed relative to the bus; at it the motor gives no torque that would raise it."""
+    allocation: Literal["least_squares", "least_peak"] = "least_squares"
+    """Of all motor torques that make the commanded one, those of least norm, or those whose largest
+    is least; the latter for one wheel more than the axes span, such as four in a pyramid."""
+
+    @model_validator(mode="after")
+    def _alike(self) -> "Wheels":
+        if self.positions is not None and len(self.positions) != len(self.axes):
+            raise ValueError(
+                f"positions: {len(self.positions)} rows for {len(self.axes)} axes: give as many"
+            )
+        return self
+
+    @property
+    def fitted(self) -> bool:
+        """Whether there are any."""
+        return bool(self.axes)
+
+    @property
+    def rotors(self) -> mass_properties.Rotors:
+        """Their mass properties without imbalance, for the balance of the vehicle."""
+        axes = np.reshape(np.array(self.axes, dtype=float), (-1, 3))
+        axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+        centres = np.zeros_like(axes) if self.positions is None else np.array(self.positions)
+        half = self.inertia / 2.0
+        transverse = half if self.transverse_inertia is None else self.transverse_inertia
+        return mass_properties.Rotors(axes, centres, self.mass, self.inertia, transverse)
+
+    def attach(self, spec: Any) -> None:
+        """Bolt each wheel to the bus, its z axis along the spin axis."""
+        for index, axis in enumerate(self.rotors.axes):
+            self._attach_wheel(spec, index, axis)
+
+    def driven(self, model: Any) -> Driven:
+        """Return their motors and hinges."""
+        names = _names(len(self.axes))
+        return Driven(motors=names, wheels=names)
+
+    def dry_friction(self) -> dict[str, Friction]:
+        """Return the dry friction of each wheel's bearing."""
+        if self.friction is None:
+            return {}
+        return dict.fromkeys(_names(len(self.axes)), self.friction)
+
+    def actuator(self, context: Context) -> "ReactionWheels":
+        """Return the wheels.
+
+        Warns:
+            ModelWarning: they are alone, and there are axes about which they give no torque.
+        """
+        vehicle = context.vehicle
+        inertia = stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[: len(self.axes)]]
+        limits = self.torque_limit or inf, self.speed_limit or inf
+        wheels = ReactionWheels(vehicle.wheel_axes, *limits, self.allocation, inertia)
+        if context.alone and len(wheels.unreachable):
+            about = " and ".join(str(np.round(axis, 6) + 0.0) for axis in wheels.unreachable)
+            warnings.warn(
+                f"plant.wheels.axes span {3 - len(wheels.unreachable)} of 3 directions: the wheels "
+                f"give no torque about {about}, body axes, and report one that is commanded there "
+                f"as saturation",
+                model_checks.ModelWarning,
+                stacklevel=2,
+            )
+        return wheels
+
+    def _attach_wheel(self, spec: Any, index: int, axis: Array) -> None:
+        (name,) = _names(index + 1)[index:]
+        part = mujoco.MjSpec.from_file(str(ASSETS / "parts/reaction_wheel/reaction_wheel.xml"))
+        rotor, joint, motor = part.body("rotor"), part.joint("spin"), part.actuator("motor")
+        rotor.mass, rotor.ipos, rotor.inertia, rotor.iquat = self._rotor()
+        joint.damping = [self.viscous_friction, 0.0, 0.0]  # linear, quadratic, cubic
+        if self.torque_limit is not None:
+            motor.ctrllimited = True
+            motor.ctrlrange = [-self.torque_limit, self.torque_limit]
+
+        mount = spec.body("bus").add_frame()
+        mujoco.mju_quatZ2Vec(mount.quat, axis)
+        if self.positions is not None:
+            mount.pos = self.positions[index]
+        else:
+            reach = _exit(spec.geom("bus_hull").size, axis) + _GAP
+            for geom in part.geoms:
+                geom.pos[2] += reach
+        spec.attach(part, prefix=f"{name}_", frame=mount)
+        rotor.name = joint.name = motor.name = motor.target = name
+
+    def _rotor(self) -> mass_properties.Inertial:
+        """Return the mass properties of each rotor, its spin axis along z.
+
+        Raises:
+            ValueError: no rotor has that transverse inertia, or so large a product of inertia.
+        """
+        axial, transverse = self.inertia, self.rotors.transverse_inertia
+        if 2.0 * transverse < axial:
+            raise ValueError(
+                f"plant.wheels.transverse_inertia: {transverse:g} kg m^2 is less than half the "
+                f"axial {axial:g} kg m^2: no rotor has that"
+            )
+        balanced = mass_properties.Inertial(
+            self.mass,
+            np.zeros(3),
+            np.array([transverse, transverse, axial]),
+            np.array([1.0, 0.0, 0.0, 0.0]),
+        )
+        along_z = np.array([0.0, 0.0, 1.0])
+        return mass_properties.off_balance(balanced, along_z, self, "plant.wheels")
+
+
+def _names(count: int) -> tuple[str, ...]:
+    return tuple(f"wheel_{index}" for index in range(count))
+
+
+def _exit(half_size: Array, axis: Array) -> float:
+    """Return how far from its centre [m] a ray along ``axis`` leaves a box of that half size."""
+    with np.errstate(divide="ignore"):
+        return float(np.min(half_size / np.abs(axis)))
 
 
 @dataclass(frozen=True)
-class ReactionWheels:
+class ReactionWheels(Actuator):
     """Wheels that are all alike, and share a torque by least norm or by least peak.
 
     Friction is not compensated: what the bearings take is the law's to find out.
@@ -31,44 +182,20 @@ class ReactionWheels:
     speed_limit: float = inf
     """Largest speed relative to the bus [rad/s]."""
     shared_by: Literal["least_squares", "least_peak"] = "least_squares"
-    """Of all motor torques that would do, those of least norm, or whose largest is least."""
+    """Of all motor torques that make the commanded one: those of least norm or of least peak."""
     inertia: Array = field(default_factory=lambda: np.zeros(0))
     """Of each rotor against the bus, motor torque over relative acceleration [kg m^2], shape (n,);
     used by the speed limit alone."""
     logged_as: ClassVar[str] = "wheel_torque"
+    unit: ClassVar[str] = "N m"
     takes: ClassVar[Fields] = {"torque": (3, "N m")}
-    acts_on: ClassVar[str] = "ctrl"
     allocation: Array = field(init=False, repr=False)
     """Motor torques for each unit of torque on the bus, shape (n, 3): -pinv(axes^T)."""
     spare: Array = field(init=False, repr=False)
-    """Motor torques that give the bus none and may be added, shape (n,); zero for least norm."""
+    """Motor torques whose sum on the bus is zero, to be added, shape (n,); zero for least norm."""
     unreachable: Array = field(init=False, repr=False)
     """Unit vectors, body axes, about which no wheel gives any torque, shape (3 - rank, 3)."""
     _limits: Array = field(init=False, repr=False)
-
-    @classmethod
-    def of(
-        cls, vehicle: Vehicle, shared_by: Literal["least_squares", "least_peak"], *, alone: bool
-    ) -> Self:
-        """Return the reaction wheels of a vehicle, which are ``alone`` where nothing else acts.
-
-        Warns:
-            guards.ModelWarning: they are alone, and there are axes about which they give no torque.
-        """
-        count = len(vehicle.wheel_axes)
-        inertia = stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[:count]]
-        limits = vehicle.torque_limit, vehicle.speed_limit
-        wheels = cls(vehicle.wheel_axes, *limits, shared_by, inertia)
-        if alone and len(wheels.unreachable):
-            about = " and ".join(str(np.round(axis, 6) + 0.0) for axis in wheels.unreachable)
-            warnings.warn(
-                f"plant.wheels.axes span {3 - len(wheels.unreachable)} of 3 directions: the wheels "
-                f"give no torque about {about}, body axes, and report one that is commanded there "
-                f"as saturation",
-                model_checks.ModelWarning,
-                stacklevel=2,
-            )
-        return wheels
 
     def __post_init__(self) -> None:
         if np.isfinite(self.speed_limit) and len(self.inertia) != len(self.axes):
@@ -91,9 +218,10 @@ class ReactionWheels:
         """Whether they act in every integration step: a speed limit does."""
         return bool(np.isfinite(self.speed_limit))
 
-    def reset(self, vehicles: int) -> State:
-        """Return no state."""
-        return {}
+    @property
+    def drives(self) -> Input:
+        """Their motors."""
+        return motors(_names(len(self.axes)))
 
     def limits(self) -> dict[str, tuple[Array, Array]]:
         """Return the torque that the wheels together apply about each axis."""
@@ -107,20 +235,16 @@ class ReactionWheels:
         """Return what ``motor_torque`` does for a ``TorqueCommand``."""
         return state, *self.motor_torque(command.torque, truth.wheel_speed, step)
 
-    def seen(self, state: State, truth: Measurement) -> Measurement:
-        """Return the truth: the wheels show their speed alone."""
-        return truth
-
     def motor_torque(self, torque: Array, wheel_speed: Array, step: float) -> tuple[Array, Array]:
         """Return (ctrl, saturated), each of shape (..., n), for the next ``step`` [s].
 
         ``torque`` (..., 3) is commanded on the bus, body axes [N m]; ``wheel_speed`` (..., n) is
         relative to the bus [rad/s]. ``ctrl`` [N m] is the motors' torque on their rotors, whose
-        reaction turns the bus: of all that give ``torque``, as ``shared_by`` says, each wheel's
-        then cut to the torque limit, and so that the step ends at the speed limit. What the bus's
-        other torques add to a relative speed within the step, the motor does not take away.
-        ``saturated`` is 1.0 for a wheel whose torque is cut, else 0.0; and 1.0 for every wheel
-        where ``torque`` has a part that none of them can give.
+        reaction turns the bus: of all that make ``torque``, as ``shared_by`` says, each wheel's
+        then limited to the torque limit, and so that the step ends at the speed limit. What other
+        torques on the bus add to a relative speed within the step, the motor does not take away.
+        ``saturated`` is 1.0 for a wheel whose torque is limited, else 0.0; and 1.0 for every
+        wheel where ``torque`` has a part that none of them can apply.
         """
         # Past Numba's wrapper, and with both limits in one array: 1.6 us a call, not 2.6.
         applied: tuple[Array, Array] = _motor_torque.ufunc(
@@ -136,7 +260,7 @@ class ReactionWheels:
         return applied
 
     def _unreachable(self) -> Array:
-        """Return ``unreachable``; of a vehicle without wheels none, as nobody counts on them."""
+        """Return ``unreachable``; none for a vehicle without wheels, on which nothing relies."""
         if not len(self.axes):
             return np.zeros((0, 3))
         _, singular, right = np.linalg.svd(self.axes)
@@ -153,8 +277,8 @@ class ReactionWheels:
         free = len(self.axes) - int(np.sum(singular > 1e-9))
         if free != 1:
             raise ValueError(
-                f"wheels.allocation: least_peak wants one wheel more than their axes span, as four "
-                f"of a pyramid are; here it is {free} more: least_squares would do"
+                f"plant.wheels.allocation: least_peak needs one wheel more than their axes span, "
+                f"as four of a pyramid are; here it is {free} more: use least_squares"
             )
         one: Array = right[-1]
         return np.where(np.abs(one) < 1e-12, 0.0, one)

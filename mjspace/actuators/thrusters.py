@@ -1,27 +1,150 @@
 """Reaction-control thrusters: valves with a delay and a least pulse, thrust with a lag, a tank."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
+import mujoco
 import numpy as np
 from numba import guvectorize
+from pydantic import Field, model_validator
 
-from mjspace.actuators.base import Fields, State
-from mjspace.actuators.engine import DRY
+from mjspace.actuators import tank as tanks
+from mjspace.actuators.base import (
+    Actuator,
+    ActuatorTable,
+    Context,
+    Fields,
+    Input,
+    State,
+    motors,
+)
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
-from mjspace.scenario.plant import Rates
-from mjspace.scenario.thrusters import Rcs
+from mjspace.scenario.equipment import Driven
+from mjspace.scenario.fields import Meters3, Positive, Seconds, Si, Table, Time, Unit3
 from mjspace.vehicle.vehicle import Vehicle
 
 FIELDS = ("rcs_thrust", "rcs_open", "rcs_on_time", "rcs_asked", "rcs_step", "rcs_propellant")
 _ROUNDING = 1e-12
 """s: pulses that are closer than this are one."""
+_HYDRAZINE = 1010.0  # kg/m^3 at 20 deg C
+_HIDDEN = 5  # a group of sites that no picture shows
+_NOZZLE_AND_PLUME = (
+    # name, shape, size [m], how far out its centre is [m], color
+    ("nozzle", mujoco.mjtGeom.mjGEOM_CYLINDER, [0.03, 0.035, 0.0], 0.03, [0.15, 0.15, 0.17, 1.0]),
+    ("plume", mujoco.mjtGeom.mjGEOM_ELLIPSOID, [0.06, 0.06, 0.26], 0.3, [0.5, 0.72, 1.0, 0.0]),
+)
+
+
+class Rcs(ActuatorTable, Table):
+    """On/off thrusters that are all alike, one for each row of ``positions``.
+
+    Their command is an ``on_time`` for each, of the control period that begins. Propellant is in a
+    spherical tank at the body origin, full of hydrazine at first; it loses mass and keeps its size.
+    """
+
+    positions: Annotated[list[Meters3], Field(min_length=1)]
+    """Where each pushes, body axes."""
+    directions: list[Unit3]
+    """Of each one's force on the vehicle, body axes; normalized."""
+    thrust: Annotated[Positive, Si("N")]
+    """Of each, steady."""
+    minimum_on: Time = 0.0
+    """A valve that opens stays open at least that long, even if commanded for less."""
+    delay: Time = 0.0
+    """From the command to the valve, for opening and closing alike."""
+    rise: Time = 0.0
+    """Time constant with which the thrust follows its valve."""
+    specific_impulse: Seconds | None = None
+    """Thrust over the weight of the propellant's flow, on Earth; burns nothing when left out."""
+    propellant: Annotated[Positive, Si("kg")] | None = None
+    """In the tank at the start; goes with ``specific_impulse``."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Rcs":
+        if len(self.directions) != len(self.positions):
+            raise ValueError(
+                f"directions: {len(self.directions)} rows for {len(self.positions)} positions: "
+                "give as many"
+            )
+        if (self.specific_impulse is None) != (self.propellant is None):
+            raise ValueError("specific_impulse and propellant: give both or neither")
+        return self
+
+    @property
+    def unit_directions(self) -> list[list[float]]:
+        """``directions``, each of length one."""
+        rows = np.array(self.directions)
+        unit: list[list[float]] = (rows / np.linalg.norm(rows, axis=1, keepdims=True)).tolist()
+        return unit
+
+    def attach(self, spec: Any) -> None:
+        """Add a site, a motor, a nozzle and a plume for each thruster, and the tank."""
+        spec.add_material(name="thruster", emission=0.8)
+        for index, (place, way) in enumerate(
+            zip(self.positions, self.unit_directions, strict=True)
+        ):
+            _attach_thruster(spec, f"thruster_{index}", place, way)
+        if self.propellant is not None:
+            radius = np.cbrt(self.propellant / (4.0 / 3.0 * np.pi * _HYDRAZINE))
+            tanks.add_sphere(spec, "rcs_tank", self.propellant, radius)
+
+    def driven(self, model: Any) -> Driven:
+        """Return its motors."""
+        return Driven(motors=_names(len(self.positions)))
+
+    def facts(self, vehicle: Vehicle) -> dict[str, Any]:
+        """Return where each thruster pushes and how, its force [N] and its shortest pulse [s]."""
+        return {
+            "thruster_positions": np.array(self.positions),
+            "thruster_directions": np.array(self.unit_directions),
+            "thruster_force": np.full(len(self.positions), self.thrust),
+            "thruster_minimum_on": self.minimum_on,
+        }
+
+    def actuator(self, context: Context) -> "Thrusters":
+        """Return the thrusters of a vehicle that was composed with them."""
+        rates = context.rates
+        period, steps = (rates.physics, 1) if context.inner else (rates.control, rates.steps)
+        flow, tank, full = 0.0, 0, np.zeros(3)
+        if self.specific_impulse is not None:
+            model = context.vehicle.model
+            flow = 1.0 / (self.specific_impulse * STANDARD_GRAVITY)
+            tank = model.body("rcs_tank").id
+            full = model.body_inertia[tank] / self.propellant
+        valve = [self.minimum_on, self.delay, self.rise]
+        data = np.array([self.thrust, flow, *valve, period, float(steps)])
+        memory = 1 + ceil(self.delay / period - 1e-9)
+        return Thrusters(data, len(self.positions), memory, tank, full, self.propellant or 0.0)
+
+
+def _names(count: int) -> tuple[str, ...]:
+    return tuple(f"thruster_{index}" for index in range(count))
+
+
+def push_on_bus(spec: Any, name: str, place: Sequence[float], way: Sequence[float]) -> None:
+    """Add a motor of that name that pushes on the bus at ``place`` [m] along ``way``, body axes."""
+    spec.body("bus").add_site(name=name, pos=place, group=_HIDDEN)
+    site = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": name}
+    spec.add_actuator(name=name, gear=[*way, 0.0, 0.0, 0.0], **site)
+
+
+def _attach_thruster(spec: Any, name: str, place: list[float], way: list[float]) -> None:
+    """Let a thruster push on the bus; its plume is hidden until a picture shows it."""
+    push_on_bus(spec, name, place, way)
+    out = -np.array(way)
+    for drawn, kind, size, ahead, color in _NOZZLE_AND_PLUME:
+        geom = spec.body("bus").add_geom(type=kind, size=size, pos=place + ahead * out, rgba=color)
+        geom.name, geom.group, geom.mass = f"{name}_{drawn}", 2, 0.0
+        geom.contype = geom.conaffinity = 0
+        geom.material = "thruster" if drawn == "plume" else ""
+        mujoco.mju_quatZ2Vec(geom.quat, out)
 
 
 @dataclass(frozen=True)
-class Thrusters:
+class Thrusters(Actuator):
     """On/off thrusters that obey a ``PulseCommand``.
 
     A pulse begins a ``delay`` after its control period does, or the integration step for which an
@@ -43,25 +166,14 @@ class Thrusters:
     """At the start [kg]."""
 
     logged_as: ClassVar[str] = "thruster_thrust"
-    acts_on: ClassVar[str] = "ctrl"
+    unit: ClassVar[str] = "N"
+    measures: ClassVar[dict[str, str]] = {"thrust": "N", "propellant": "kg"}
     stateful: ClassVar[bool] = True
 
-    @classmethod
-    def of(cls, vehicle: Vehicle, table: Rcs, rates: Rates, *, inner: bool = False) -> Self:
-        """Return the thrusters of a vehicle that was composed with them.
-
-        With ``inner`` the law's inner loop commands them, anew in every integration step.
-        """
-        period, steps = (rates.physics, 1) if inner else (rates.control, rates.steps)
-        flow, tank, full = 0.0, 0, np.zeros(3)
-        if table.specific_impulse is not None:
-            flow = 1.0 / (table.specific_impulse * STANDARD_GRAVITY)
-            tank = vehicle.model.body("rcs_tank").id
-            full = vehicle.model.body_inertia[tank] / table.propellant
-        valve = [table.minimum_on, table.delay, table.rise]
-        data = np.array([table.thrust, flow, *valve, period, float(steps)])
-        memory = 1 + ceil(table.delay / period - 1e-9)
-        return cls(data, len(table.positions), memory, tank, full, table.propellant or 0.0)
+    @property
+    def drives(self) -> Input:
+        """Its motors."""
+        return motors(_names(self.count))
 
     @property
     def takes(self) -> Fields:
@@ -93,17 +205,17 @@ class Thrusters:
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
-        """Return (state, mean thrust [N], whether each does otherwise than told), (N, n).
+        """Return (state, mean thrust [N], saturated), (N, n).
 
-        A thruster does when its on-time is no part of the control period, or shorter than the least
-        pulse, or when its tank is empty.
+        A thruster is saturated when its on-time is no part of the control period or shorter than
+        the least pulse, or when its tank is empty.
         """
-        asked = np.asarray(command.on_time, dtype=float)
+        on_time = np.asarray(command.on_time, dtype=float)
         before = (state[name] for name in FIELDS)
-        *after, mean, cut = _pulse.ufunc(*before, asked, self.data, step)
-        return dict(zip(FIELDS, after, strict=True)), mean, cut
+        *after, mean, saturated = _pulse.ufunc(*before, on_time, self.data, step)
+        return dict(zip(FIELDS, after, strict=True)), mean, saturated
 
-    def seen(self, state: State, truth: Measurement) -> Measurement:
+    def measured(self, state: State, truth: Measurement) -> Measurement:
         """Return the truth with thrust and what is left in the tank, an engine's before them."""
         thrust = np.concatenate([truth.thrust, state["rcs_thrust"]], axis=-1)
         if not self.tank:
@@ -112,32 +224,25 @@ class Thrusters:
         return truth._replace(thrust=thrust, propellant=left)
 
     def account_propellant(
-        self, state: State, given: Array, instead: Array, step: float
+        self, state: State, applied: Array, instead: Array, step: float
     ) -> tuple[State, Array]:
-        """Return (state, thrust) where faults have made ``instead`` of what ``act`` gave, (N, n).
+        """Return (state, thrust) where faults have made ``instead`` of what ``act`` applied.
 
         What is fired is burnt, and an empty tank fires nothing.
         """
         left, flow = state["rcs_propellant"], self.data[1]
         if flow:
             instead = np.where(left > 0.0, instead, 0.0)
-            burnt = flow * step * np.sum(instead - given, axis=-1, keepdims=True)
+            burnt = flow * step * np.sum(instead - applied, axis=-1, keepdims=True)
             state = state | {"rcs_propellant": np.maximum(left - burnt, 0.0)}
         return state, instead
 
     def masses(self, before: State, after: State) -> dict[str, tuple[int, Array]]:
-        """Return, of MuJoCo's model, the body and the values of each field that burning changes.
-
-        They are those in the middle of the integration step that leads from ``before`` to
-        ``after``: with them a constant thrust gives Tsiolkovsky's velocity to second order.
-        """
+        """Return mass and inertia of the tank."""
         if not self.tank:
             return {}
-        left = np.maximum(0.5 * (before["rcs_propellant"] + after["rcs_propellant"]), DRY)
-        return {
-            "body_mass": (self.tank, left[:, 0]),
-            "body_inertia": (self.tank, left * self.full),
-        }
+        propellant = before["rcs_propellant"], after["rcs_propellant"]
+        return tanks.masses(self.tank, self.full, *propellant)
 
 
 @guvectorize(
@@ -152,7 +257,7 @@ def _pulse(
     thrust: Any,
     opened: Any,
     on_time: Any,
-    asked: Any,
+    commanded: Any,
     count: Any,
     tank: Any,
     command: Any,
@@ -161,48 +266,48 @@ def _pulse(
     thrust_after: Any,
     opened_after: Any,
     on_time_after: Any,
-    asked_after: Any,
+    commanded_after: Any,
     count_after: Any,
     tank_after: Any,
     mean: Any,
-    cut: Any,
+    saturated: Any,
 ) -> None:
-    """Advance valves, thrust and tank by ``step`` [s]; give each thruster's mean thrust [N]."""
+    """Advance valves, thrust and tank by ``step`` [s]; compute each thruster's mean thrust [N]."""
     force, flow, least, delay, lag, period, steps = data
     dry = flow > 0.0 and tank[0] <= 0.0
     elapsed = count[0] * step
     burnt = 0.0
     for i in range(thrust.size):
-        asked_after[i] = asked[i]
+        commanded_after[i] = commanded[i]
         if count[0] == 0.0:
-            asked_after[i, 1:] = asked[i, :-1]
-            asked_after[i, 0] = min(max(command[i], 0.0), period)
+            commanded_after[i, 1:] = commanded[i, :-1]
+            commanded_after[i, 0] = min(max(command[i], 0.0), period)
         short = 0.0 < command[i] < least - _ROUNDING
         beyond = command[i] < 0.0 or command[i] > period + _ROUNDING
-        cut[i] = 1.0 if short or beyond or (dry and command[i] > 0.0) else 0.0
+        saturated[i] = 1.0 if short or beyond or (dry and command[i] > 0.0) else 0.0
 
         now, impulse, open_for, on = 0.0, 0.0, opened[i], on_time[i]
         flowing = 0.0 if dry else thrust[i]
         while now < step - _ROUNDING:
             # Until when the valve is as it is at `now`.
-            wanted, until = False, step
-            for k in range(asked.shape[1]):
+            is_open, until = False, step
+            for k in range(commanded.shape[1]):
                 start = delay - elapsed - k * period
-                stop = start + asked_after[i, k]
+                stop = start + commanded_after[i, k]
                 if start - _ROUNDING <= now < stop - _ROUNDING:
-                    wanted = True
+                    is_open = True
                     until = min(until, stop)
-                elif start > now + _ROUNDING and asked_after[i, k] > _ROUNDING:
+                elif start > now + _ROUNDING and commanded_after[i, k] > _ROUNDING:
                     until = min(until, start)
-            held = not wanted and 0.0 < open_for < least - _ROUNDING
+            held = not is_open and 0.0 < open_for < least - _ROUNDING
             if held:
                 until = min(until, now + least - open_for)
             span = until - now
-            target = force if (wanted or held) and not dry else 0.0
+            target = force if (is_open or held) and not dry else 0.0
             share = np.exp(-span / lag) if lag > 0.0 else 0.0
             impulse += target * span + (flowing - target) * (1.0 - share) * lag
             flowing = target + (flowing - target) * share
-            if wanted or held:
+            if is_open or held:
                 open_for += span
                 on += span
             else:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -14,7 +15,6 @@ from mjspace.rendering import overlay
 from mjspace.rendering.offscreen import Canvas
 from mjspace.rendering.scene import Stage
 from mjspace.rendering.video import Frame, Video
-from mjspace.scenario.landing import Engine
 from mjspace.vehicle.vehicle import from_bytes
 
 
@@ -117,8 +117,8 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
             yield overlay.write(canvas.draw(stage.scene), left, (f"{time:.2f} s", how_well))
 
 
-def shares_of_thrust(log: Log, engine: Engine | None, times: Array) -> Iterator[float]:
-    """Yield the engine's share of its largest thrust: 0 where there is none."""
+def shares_of_thrust(log: Log, engine: Any, times: Array) -> Iterator[float]:
+    """Yield the share of the largest thrust of ``engine``, its table: 0 where that is None."""
     if engine is None:
         yield from repeat(0.0, len(times))
     else:

@@ -13,6 +13,7 @@ from mjspace.log.writer import LogWriter
 from mjspace.scenario.loading import to_toml
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.recording import Block, one_vehicle, shapes
+from mjspace.units import Unit
 from mjspace.vehicle import vehicle
 
 FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
@@ -38,13 +39,16 @@ class Recorder:
             is_code = name.endswith(".py")
             media_type = "text/x-python" if is_code else "application/octet-stream"
             attachments[name] = (media_type, content)
+        units = topics.units(first.kinds)
+        for topic, declared in assembly.actuators.units.items():
+            units[topic] = units[topic] | {n: Unit(unit) for n, unit in declared.items()}
         self._log = LogWriter(
             path,
             shapes(first),
             provenance.metadata(assembly.scenario, compiled, member),
             attachments,
             scene(model),
-            topics.units(first.kinds),
+            units,
         )
         self._model, self._data = model, mujoco.MjData(model)
         self._stride = max(1, round(FRAME_PERIOD / assembly.scenario.rates.control))

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from mjspace.errors import InputError, nearest
 from mjspace.scenario import overrides as keys
 from mjspace.scenario.construct import plain
+from mjspace.scenario.equipment import type_of
 from mjspace.scenario.scenario import Component, Scenario
 
 
@@ -209,9 +210,7 @@ def _keys_at(parents: list[Any]) -> list[str]:
     for part in parents:
         if isinstance(part, int) or model is None:
             continue
-        model = (
-            _model_in(model.model_fields[part].annotation) if part in model.model_fields else None
-        )
+        model = _model_in(type_of(model.model_fields[part])) if part in model.model_fields else None
     return list(model.model_fields) if model is not None else []
 
 

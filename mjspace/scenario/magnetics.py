@@ -1,4 +1,4 @@
-"""The tables of what is magnetic in a scenario: the Earth's field, and the magnetorquers in it."""
+"""The table of the Earth's magnetic field in a scenario."""
 
 import math
 from datetime import UTC, datetime
@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from mjspace.scenario.fields import NonNegative, Positive, Si, Table, Time, Unit3
+from mjspace.scenario.fields import NonNegative, Si, Table
 
 
 class MagneticField(Table):
@@ -34,14 +34,3 @@ class MagneticField(Table):
         if not 1900 <= universal.year < 2030:
             raise ValueError(f"{epoch:%Y-%m-%d}: the field (IGRF-14) is known from 1900 to 2030")
         return universal
-
-
-class Magnetorquers(Table):
-    """Coils whose magnetic moment the Earth's field turns: one for each axis, all alike."""
-
-    axes: Annotated[list[Unit3], Field(min_length=1)] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    """Axes of the coils in body axes, one row for each; normalized."""
-    dipole_limit: Annotated[Positive, Si("A m^2")] | None = None
-    """Largest magnetic moment of each; none when left out."""
-    time_constant: Time = 0.0
-    """With which the moment follows its command."""

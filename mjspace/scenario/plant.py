@@ -1,10 +1,11 @@
 """The tables of a scenario: rates, plant and initial state."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from mjspace.scenario.deployments import Deployment
+from mjspace.scenario.equipment import DeclaredIn, declaration
 from mjspace.scenario.fields import (
     Angles3,
     Finite,
@@ -18,18 +19,12 @@ from mjspace.scenario.fields import (
     Rate3,
     Seconds,
     Si,
-    Switch,
     Table,
-    Unit3,
     Velocity3,
     WithinTurn,
 )
-from mjspace.scenario.hinges import Bearing, Hinge
-from mjspace.scenario.landing import Engine, Ground
-from mjspace.scenario.magnetics import Magnetorquers
-from mjspace.scenario.motors import Pmsm
-from mjspace.scenario.servos import Servos
-from mjspace.scenario.thrusters import Rcs
+from mjspace.scenario.hinges import Hinge
+from mjspace.scenario.landing import Ground
 from mjspace.units import whole_number
 
 
@@ -49,34 +44,7 @@ class Rates(Table):
         return whole_number(self.control, self.physics, "rates.control", "rates.physics")
 
 
-class Wheels(Bearing):
-    """Reaction wheels: one for each axis; every wheel is alike."""
-
-    axes: list[Unit3] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    """Spin axes in body axes, one row for each wheel; normalized. None: ``[]``."""
-    positions: list[Meters3] | None = None
-    """Rotor centres in the body [m]; the centre of mass when left out."""
-    inertia: Annotated[Positive, Si("kg m^2")] = 0.05
-    """Axial rotor inertia."""
-    transverse_inertia: Annotated[Positive, Si("kg m^2")] | None = None
-    """Transverse rotor inertia; half the axial when left out."""
-    mass: Annotated[Positive, Si("kg")] = 2.0
-    """Rotor mass."""
-    torque_limit: Annotated[Positive, Si("N m")] | None = None
-    """Largest motor torque; none when left out."""
-    speed_limit: Annotated[Positive, Si("rad/s")] | None = None
-    """Largest speed relative to the bus; at it the motor gives no torque that would raise it."""
-    allocation: Literal["least_squares", "least_peak"] = "least_squares"
-    """Of all motor torques that make the wanted one, those of least norm, or those whose largest is
-    least; the latter for one wheel more than the axes span, such as four in a pyramid."""
-
-    @model_validator(mode="after")
-    def _alike(self) -> "Wheels":
-        if self.positions is not None and len(self.positions) != len(self.axes):
-            raise ValueError(
-                f"positions: {len(self.positions)} rows for {len(self.axes)} axes: give as many"
-            )
-        return self
+_WHEELS = DeclaredIn("mjspace.actuators.reaction_wheels:Wheels", optional=False)
 
 
 class Ripple(Table):
@@ -115,7 +83,9 @@ class Part(Table):
 
 
 class PlantTable(Table):
-    """The vehicle: an assembly from assets/, with its mass properties and wheels."""
+    """The vehicle: an assembly from assets/, with its mass properties, parts and actuators."""
+
+    model_config = ConfigDict(defer_build=True)
 
     model: str = "satellite_3rw"
     """Name of a folder in assets/."""
@@ -131,46 +101,59 @@ class PlantTable(Table):
     """Mass of the whole vehicle, with all that is on it; the bus's follows, not ``mass``."""
     vehicle_inertia: Matrix3 | None = None
     """Inertia of the whole vehicle, joints at rest, about its centre of mass, which is the body
-    origin; the bus inertia follows. Wants ``vehicle_mass``."""
-    wheels: Wheels = Wheels()
+    origin; the bus inertia follows. Needs ``vehicle_mass``."""
     parts: dict[Name, Part] = {}
     """By a name of one's own: ``[plant.parts.damper]``. They add to the bus's mass and inertia, and
     to neither ``gyrostat_inertia`` nor the ``inertia`` that a law is given."""
     hinges: dict[Name, Hinge] = {}
     """Bearings of the parts' hinges, by the hinge: ``[plant.hinges.cmg_wheel]``."""
-    drives: dict[Name, Pmsm] = {}
-    """Electric motors that turn hinges of the parts, by the hinge: ``[plant.drives.cmg_outer]``. A
-    hinge whose name ends in ``wheel`` is a wheel, any other a gimbal."""
-    servos: Servos | None = None
-    """Speed loops on every hinge of the parts that a motor turns, in place of ``drives``; none when
-    left out."""
     ripple: dict[Name, Ripple] = {}
     """Torque ripple of motors, by the hinge."""
-    ideal_thrusters: Switch = False
-    """Whether a torque that the law asks for acts on the bus as if by thrusters, as it is: its
-    command's ``torque`` or, beside motors or an engine, its ``thruster_torque``."""
-    magnetorquers: Magnetorquers | None = None
-    """None when left out; in an environment with a magnetic field they obey the command's
-    ``dipole``."""
-    engine: Engine | None = None
-    """What its engine on gimbals does, of a model that has one; no wheels then."""
-    rcs: Rcs | None = None
-    """Its reaction-control thrusters; none when left out."""
     ground: Ground | None = None
     """What is below it; nothing when left out."""
 
-    @model_validator(mode="after")
-    def _one_kind_of_motor(self) -> "PlantTable":
-        kinds = {
-            "drives": bool(self.drives),
-            "servos": self.servos is not None,
-            "engine": self.engine is not None,
+    # The actuators, in the order in which they act and are logged. A line registers each.
+    drives: Annotated[Any, DeclaredIn("mjspace.actuators.motor_drives:DriveTables")] = None
+    """Electric motors that turn hinges of the parts, by the hinge: ``[plant.drives.cmg_outer]``. A
+    hinge whose name ends in ``wheel`` is a wheel, any other a gimbal."""
+    servos: Annotated[Any, DeclaredIn("mjspace.actuators.gimbal_servos:Servos")] = None
+    """Speed loops on every hinge of the parts that a motor turns, in place of ``drives``; none when
+    left out."""
+    engine: Annotated[Any, DeclaredIn("mjspace.actuators.engine:Engine")] = None
+    """Its engine on gimbals, of a model that has one; no wheels then."""
+    wheels: Annotated[Any, _WHEELS] = Field(default_factory=lambda: _WHEELS.table())
+    """Its reaction wheels; three on the body axes when left out."""
+    ideal_thrusters: Annotated[Any, DeclaredIn("mjspace.actuators.ideal_thrusters:Switched")] = None
+    """Whether the torque that the law commands acts on the bus as if by thrusters, unchanged: its
+    command's ``torque`` or, beside motors or an engine, its ``thruster_torque``. Not when left
+    out."""
+    rcs: Annotated[Any, DeclaredIn("mjspace.actuators.thrusters:Rcs")] = None
+    """Its reaction-control thrusters; none when left out."""
+    magnetorquers: Annotated[Any, DeclaredIn("mjspace.actuators.magnetorquers:Magnetorquers")] = (
+        None
+    )
+    """None when left out; in an environment with a magnetic field they obey the command's
+    ``dipole``."""
+
+    @property
+    def equipment(self) -> dict[str, Any]:
+        """The tables of all that is fitted, by key, in the order of the keys.
+
+        A vehicle without anything else has reaction wheels, of which there may be none.
+        """
+        declared = [name for name, field in type(self).model_fields.items() if declaration(field)]
+        tables = {name: getattr(self, name) for name in declared}
+        return {n: table for n, table in tables.items() if table is not None and table.fitted} or {
+            "wheels": self.wheels
         }
-        given = [name for name, is_given in kinds.items() if is_given]
-        if given and self.wheels.axes:
-            raise ValueError("one kind of motor: set wheels.axes = [] to fly without wheels")
-        if len(given) > 1:
-            raise ValueError(f"{given[0]} and {given[1]} are both given: give one")
+
+    @model_validator(mode="after")
+    def _beside_each_other(self) -> "PlantTable":
+        fitted = self.equipment
+        for key, table in fitted.items():
+            for other in table.excludes:
+                if other in fitted:
+                    raise ValueError(f"{key} and {other} are both given: {fitted[other].cure}")
         return self
 
     @model_validator(mode="after")
@@ -206,7 +189,7 @@ class Initial(Table):
     joint_speed: dict[Name, Finite] = {}
     """Speeds of the parts' joints, by name [rad/s or m/s]."""
     momentum: Momentum3 | None = None
-    """Or the wanted total angular momentum about the centre of mass, inertial axes: the wheel
+    """Or the desired total angular momentum about the centre of mass, inertial axes: the wheel
     speeds follow (the smallest, where more than three wheels can make it)."""
     thrust: Annotated[NonNegative, Si("N")] | None = None
     """Of the engine; at trim when left out: what holds the vehicle's weight where it starts, within

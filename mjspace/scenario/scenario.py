@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
+    Field,
     ValidationInfo,
     field_validator,
     model_validator,
@@ -145,6 +146,8 @@ class Check(SignalRegion):
 class Scenario(Table):
     """One flight, whole: what flies, where, under which law, how long, and what it must show."""
 
+    model_config = ConfigDict(defer_build=True)
+
     name: str = ""
     """The file's name when left out."""
     description: str
@@ -156,7 +159,7 @@ class Scenario(Table):
     duration: Seconds
     """Simulated time."""
     rates: Rates = Rates()
-    plant: PlantTable = PlantTable()
+    plant: PlantTable = Field(default_factory=PlantTable)
     initial: Initial = Initial()
     environment: Environment = Environment()
     sensors: Sensors = Sensors()

@@ -10,27 +10,20 @@ import numpy as np
 
 from mjspace.actuators import faults
 from mjspace.actuators.actuator_set import ActuatorSet
-from mjspace.actuators.base import Actuators, IdealThrusters
-from mjspace.actuators.engine import GimballedEngine
+from mjspace.actuators.base import Actuator, Context
 from mjspace.actuators.faults import FaultSet
-from mjspace.actuators.gimbal_servos import GimbalServos
-from mjspace.actuators.magnetorquers import CoilSet
-from mjspace.actuators.motor_drives import MotorDrives
-from mjspace.actuators.reaction_wheels import ReactionWheels
-from mjspace.actuators.thrusters import Thrusters
 from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.environment import central_gravity, install
 from mjspace.environment.geomagnetism import FieldAlongOrbit, along
 from mjspace.errors import input_error_at
 from mjspace.scenario.construct import construct, load_object
 from mjspace.scenario.hinges import Friction
-from mjspace.scenario.landing import Engine
 from mjspace.scenario.plant import PlantTable
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
-from mjspace.vehicle import deployments, ground_contact, indices
+from mjspace.vehicle import deployments, ground_contact
 from mjspace.vehicle.vehicle import Vehicle, build, initial_state
 
 METHODS = {
@@ -99,8 +92,8 @@ class Assembly:
         scenario = self.scenario
         if not scenario.faults:
             return None
-        kinds, motors = self.actuators.kinds, self.vehicle.motors
-        return FaultSet(scenario.faults, kinds, motors, self.hold, scenario.seed, members)
+        kinds = self.actuators.kinds
+        return FaultSet(scenario.faults, kinds, self.hold, scenario.seed, members)
 
     def _gravity(self, position: Array) -> Array:
         """Return the central gravity [m/s^2] at ``position`` [m], both (..., 3)."""
@@ -131,9 +124,9 @@ def assemble(
         "wheel_inertia": vehicle.wheel_inertia,
         "control_period": scenario.rates.control,
         "inner_period": scenario.rates.physics,
-        **_of_thrusters(scenario.plant),
-        **_of_gimbals(scenario.plant, vehicle),
     }
+    for table in scenario.plant.equipment.values():
+        facts |= table.facts(vehicle)
     flown: dict[str, Any] = {}
     sources: dict[str, bytes] = {}
     law, flown["law"] = _component("law", scenario.law, facts, law_folder or folder, sources)
@@ -167,7 +160,7 @@ def assemble(
             ripple,
         ),
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
-        actuators=_part("plant", _actuators, vehicle, scenario, inner),
+        actuators=_part("plant", _actuators, vehicle, scenario, inner=inner),
         reference=reference,
         law=law if getattr(law, "batched", False) else UnbatchedLaw(law),
         inner=inner,
@@ -228,69 +221,35 @@ def _in_log(role: str, kind: str, found: Any, sources: dict[str, bytes]) -> str:
     return f"{role}/{file}:{name}"
 
 
-def _actuators(vehicle: Vehicle, scenario: Scenario, inner: bool) -> ActuatorSet:
-    table, rates, kinds = scenario.plant, scenario.rates, list[Actuators]()
-    if table.drives:
-        driven = [table.drives[name] for name in vehicle.motors if name in table.drives]
-        kinds.append(MotorDrives.of(vehicle, driven))
-    if table.servos is not None:
-        kinds.append(GimbalServos.of(vehicle, table.servos))
-    if table.engine is not None:
-        kinds.append(_engine(vehicle, table.engine, scenario))
-    others = table.ideal_thrusters or table.rcs or table.magnetorquers
-    if table.wheels.axes or not (kinds or others):
-        alone = not (kinds or others)
-        kinds.append(ReactionWheels.of(vehicle, table.wheels.allocation, alone=alone))
-    if table.ideal_thrusters:
-        kinds.append(IdealThrusters("thruster_torque" if kinds else "torque"))
-    if table.rcs is not None:
-        kinds.append(Thrusters.of(vehicle, table.rcs, rates, inner=inner))
-    if table.magnetorquers is not None:
-        coils = table.magnetorquers
-        axes = np.array(coils.axes) / np.linalg.norm(coils.axes, axis=1, keepdims=True)
-        kinds.append(CoilSet(axes, coils.dipole_limit or np.inf, coils.time_constant))
-    return ActuatorSet(tuple(kinds))
+def _actuators(vehicle: Vehicle, scenario: Scenario, *, inner: bool) -> ActuatorSet:
+    """Return the actuators of all that is fitted to the vehicle, in the order of plant's keys."""
+    tables, kinds = scenario.plant.equipment, tuple[Actuator, ...]()
+    gravity, alone = _gravity_at_start(scenario), len(tables) == 1
+    for key, table in tables.items():
+        with input_error_at(f"plant.{key}"):
+            driven = table.driven(vehicle.model)
+            context = Context(
+                vehicle, driven, scenario.rates, scenario.initial, gravity, inner, kinds, alone
+            )
+            kinds += (table.actuator(context),)
+    return ActuatorSet(kinds)
 
 
-def _engine(vehicle: Vehicle, table: Engine, scenario: Scenario) -> GimballedEngine:
-    """Return the engine, burning at trim unless ``initial.thrust`` says otherwise."""
-    gravity = 0.0
-    if (around := scenario.environment.gravity) is not None:
-        place = np.array(scenario.initial.position, dtype=float)
-        pull = central_gravity.acceleration(central_gravity.pack(around), place)
-        gravity = float(np.linalg.norm(pull))
-    return GimballedEngine.of(vehicle, table, gravity=gravity, thrust=scenario.initial.thrust)
-
-
-def _of_thrusters(table: PlantTable) -> dict[str, Any]:
-    """Return what a law may want to know of the vehicle's thrusters."""
-    rcs = table.rcs
-    if rcs is None:
-        return {}
-    return {
-        "thruster_positions": np.array(rcs.positions),
-        "thruster_directions": np.array(rcs.unit_directions),
-        "thruster_force": np.full(len(rcs.positions), rcs.thrust),
-        "thruster_minimum_on": rcs.minimum_on,
-    }
-
-
-def _of_gimbals(table: PlantTable, vehicle: Vehicle) -> dict[str, Any]:
-    """Return what a law may want to know of gimbals with speed loops, and the wheels in them."""
-    if table.servos is None:
-        return {}
-    return {
-        "gimbal_axes": indices.axes(vehicle.model, vehicle.gimbal_dof),
-        "spin_axes": indices.axes(vehicle.model, vehicle.wheel_dof),
-        "wheel_inertia": indices.axial_inertia(vehicle.model, vehicle.wheel_dof),
-    }
+def _gravity_at_start(scenario: Scenario) -> float:
+    """Return the central gravity where the vehicle starts [m/s^2]; 0 without."""
+    if (around := scenario.environment.gravity) is None:
+        return 0.0
+    place = np.array(scenario.initial.position, dtype=float)
+    pull = central_gravity.acceleration(central_gravity.pack(around), place)
+    return float(np.linalg.norm(pull))
 
 
 def _friction(table: PlantTable) -> dict[str, Friction]:
     """Return the dry friction of the hinges that have some, by name."""
-    wheels = {f"wheel_{i}": table.wheels.friction for i in range(len(table.wheels.axes))}
-    every = wheels | {name: hinge.friction for name, hinge in table.hinges.items()}
-    return {name: friction for name, friction in every.items() if friction is not None}
+    of_equipment = [fitted.dry_friction() for fitted in table.equipment.values()]
+    every = {name: hinge.friction for name, hinge in table.hinges.items()}
+    of_parts = {name: friction for name, friction in every.items() if friction is not None}
+    return {name: f for some in (*of_equipment, of_parts) for name, f in some.items()}
 
 
 def _part(key: str, build: Callable[..., Any], *arguments: Any, **named: Any) -> Any:

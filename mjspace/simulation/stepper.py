@@ -54,7 +54,7 @@ class Stepper:
         self._suite, self._sensors = assembly.sensors(members), start.sensors
         self.memory = start.actuators
         self._actuators, self._inner, self._hold = assembly.actuators, inner, assembly.hold
-        self._inputs = self._actuators.inputs(self.batch, assembly.vehicle.motors)
+        self._inputs = self._actuators.inputs(self.batch)
         self.effects = effects_of(assembly, self.layout, members)
         for effect in self.effects:
             effect.bind(self.batch)
@@ -175,14 +175,7 @@ class Stepper:
         """Let the actuators act on the command; return what they apply, and which saturate."""
         if self._inner is not None:
             command = self._inner(now, command, measurement)
-        try:
-            memory, applied, saturated = self._actuators.act(
-                self.memory, command, truth, self._hold
-            )
-        except _LOCATED:
-            raise
-        except Exception as error:
-            raise failure("an actuator", error) from error
+        memory, applied, saturated = self._actuators.act(self.memory, command, truth, self._hold)
         for effect in self.effects:
             try:
                 memory, applied = effect.change(memory, applied, instant)

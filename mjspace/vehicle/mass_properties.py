@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from mjspace.contract import Array
 from mjspace.scenario.hinges import Bearing
-from mjspace.scenario.plant import PlantTable, Wheels
+from mjspace.scenario.plant import PlantTable
 
 
 class Inertial(NamedTuple):
@@ -25,32 +25,19 @@ class Inertial(NamedTuple):
     """Principal axes, as a quaternion to the body's axes, scalar first, shape (4,)."""
 
 
-def unit_axes(wheels: Wheels) -> Array:
-    """Return the spin axes as unit vectors, body axes, shape (n, 3)."""
-    axes = np.reshape(np.array(wheels.axes, dtype=float), (-1, 3))
-    result: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
-    return result
+class Rotors(NamedTuple):
+    """Balanced rotors that are all alike, whose axial inertia the papers' H leaves out."""
 
-
-def rotor(wheels: Wheels) -> Inertial:
-    """Return the mass properties of each rotor, its spin axis along z.
-
-    Raises:
-        ValueError: no rotor has that transverse inertia, or so large a product of inertia.
-    """
-    axial, transverse = wheels.inertia, transverse_inertia(wheels)
-    if 2.0 * transverse < axial:
-        raise ValueError(
-            f"plant.wheels.transverse_inertia: {transverse:g} kg m^2 is less than half the axial "
-            f"{axial:g} kg m^2: no rotor has that"
-        )
-    balanced = Inertial(
-        wheels.mass,
-        np.zeros(3),
-        np.array([transverse, transverse, axial]),
-        np.array([1.0, 0.0, 0.0, 0.0]),
-    )
-    return off_balance(balanced, np.array([0.0, 0.0, 1.0]), wheels, "plant.wheels")
+    axes: Array
+    """Unit spin axes, body axes, shape (n, 3)."""
+    centres: Array
+    """Of mass, body axes [m], shape (n, 3)."""
+    mass: float
+    """Of each [kg]."""
+    inertia: float
+    """Axial, of each [kg m^2]."""
+    transverse_inertia: float
+    """About any axis through its centre across the spin axis [kg m^2]."""
 
 
 def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Inertial:
@@ -91,25 +78,23 @@ def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Iner
     return body._replace(inertia=moments, iquat=iquat)
 
 
-def bus(table: PlantTable, own: Array) -> tuple[Inertial, Array]:
+def bus(table: PlantTable, wheels: Rotors, own: Array) -> tuple[Inertial, Array]:
     """Return the bus that balances the wheels, and the gyrostat inertia H of the whole.
 
     The bus's mass is shifted so that the vehicle's centre of mass is the body origin. H is the
     whole vehicle about it less the wheels' axial inertia, body axes, shape (3, 3): H = I_bus
     + sum Jt (1 - a a^T) + the parallel-axis terms of bus and wheels. ``own`` is the bus inertia
-    [kg m^2] of a table that gives none. Wheel imbalance, which turns, is left out of the balance.
+    [kg m^2] of a table without one. Wheel imbalance, which turns, is left out of the balance.
 
     Raises:
         ValueError: the wheels take more than ``gyrostat_inertia`` has.
     """
-    wheels = table.wheels
-    axes = unit_axes(wheels)
-    centres = np.zeros_like(axes) if wheels.positions is None else np.array(wheels.positions)
+    axes, centres = wheels.axes, wheels.centres
     centre = -wheels.mass * centres.sum(axis=0) / table.mass
     offsets = table.mass * _point(centre) + wheels.mass * np.sum(
         [_point(c) for c in centres], axis=0
     )
-    across = transverse_inertia(wheels) * (len(axes) * np.eye(3) - axes.T @ axes)
+    across = wheels.transverse_inertia * (len(axes) * np.eye(3) - axes.T @ axes)
     if table.gyrostat_inertia is None:
         inertia = own if table.bus_inertia is None else np.array(table.bus_inertia)
         gyrostat = inertia + across + offsets
@@ -156,8 +141,8 @@ def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inert
     if np.linalg.eigvalsh(own)[0] <= 0.0:
         eigenvalues = np.array2string(np.linalg.eigvalsh(own), precision=4)
         raise ValueError(
-            f"plant.vehicle_inertia leaves a bus with the eigenvalues {eigenvalues} kg m^2: more "
-            "inertia or less on the parts would do"
+            f"plant.vehicle_inertia leaves a bus with the eigenvalues {eigenvalues} kg m^2: give "
+            "it more inertia, or the parts less"
         )
     return Inertial(left, centre, *principal(own))
 
@@ -169,27 +154,22 @@ def tensor(inertia: Array, iquat: Array) -> Array:
     return result
 
 
-def transverse_inertia(wheels: Wheels) -> float:
-    """Return a rotor's inertia [kg m^2] about any axis through its centre across the spin axis."""
-    return wheels.inertia / 2.0 if wheels.transverse_inertia is None else wheels.transverse_inertia
-
-
 def _point(r: Array) -> Array:
     """Return the inertia of a unit mass at ``r`` [m] about the origin."""
     result: Array = np.dot(r, r) * np.eye(3) - np.outer(r, r)
     return result
 
 
-def _too_much(inertia: Array, room: Array, across: Array, wheels: Wheels) -> str:
-    """Say what is left of ``room``, and the largest wheels that would fit into it."""
+def _too_much(inertia: Array, room: Array, across: Array, wheels: Rotors) -> str:
+    """Return what is left of ``room``, and the largest wheels that fit into it."""
     if np.linalg.eigvalsh(room)[0] <= 0.0:
-        cure = "lighter wheels or ones nearer to the centre of mass would"
+        cure = "use lighter wheels or place them nearer to the centre of mass"
     else:
-        fits = transverse_inertia(wheels) / eigh(across, room, eigvals_only=True)[-1]
+        fits = wheels.transverse_inertia / eigh(across, room, eigvals_only=True)[-1]
         cure = (
-            f"a wheel inertia below {2.0 * fits:.4g} kg m^2 would"
-            if wheels.transverse_inertia is None
-            else f"a transverse wheel inertia below {fits:.4g} kg m^2 would"
+            f"use a wheel inertia below {2.0 * fits:.4g} kg m^2"
+            if wheels.transverse_inertia == 0.5 * wheels.inertia
+            else f"use a transverse wheel inertia below {fits:.4g} kg m^2"
         )
     left = np.array2string(np.linalg.eigvalsh(inertia), precision=4)
-    return f"plant.gyrostat_inertia leaves a bus with the eigenvalues {left} kg m^2: {cure} do"
+    return f"plant.gyrostat_inertia leaves a bus with the eigenvalues {left} kg m^2: {cure}"

@@ -7,6 +7,7 @@ velocity in BODY axes. The body origin is the vehicle's centre of mass, but for 
 
 import gzip
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +15,8 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.errors import input_error_at
+from mjspace.scenario.equipment import Driven
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.vehicle import composition, indices, mass_properties, model_checks
 
@@ -24,7 +27,7 @@ class UnphysicalInertiaWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A compiled vehicle and what a law, an actuator and the log need to know of it."""
+    """A compiled vehicle and what a law, an actuator and the log use of it."""
 
     model: Any  # the ``mujoco.MjModel``
     inertia: Array
@@ -35,21 +38,17 @@ class Vehicle:
     wheel_inertia: Array
     """Axial inertia of each rotor [kg m^2], shape (n,)."""
     wheel_dof: Any
-    """Index of each wheel's speed in ``qvel``, shape (n,): reaction wheels, then driven ones."""
+    """Index of each wheel's speed in ``qvel``, shape (n,)."""
     wheel_qpos: Any
-    """Index of each driven wheel's angle in ``qpos``, shape (d,)."""
+    """Index of the angle in ``qpos`` of each wheel whose angle is measured, shape (d,)."""
     gimbal_dof: Any
-    """Index of each driven gimbal's rate in ``qvel``, shape (g,)."""
+    """Index of each gimbal's rate in ``qvel``, shape (g,)."""
     gimbal_qpos: Any
-    """Index of each driven gimbal's angle in ``qpos``, shape (g,)."""
-    drive_dof: Any
-    """Index of each driven hinge's rate in ``qvel``, in the order of its motors, shape (m,)."""
+    """Index of each gimbal's angle in ``qpos``, shape (g,)."""
     strut_qpos: Any
     """Index of each landing leg's strut in ``qpos``, shape (l,): positive where it is pressed."""
-    motors: tuple[str, ...]
-    """Names of the hinges that motors turn, then of the thrusters, in the order of ``ctrl``."""
-    torque_limit: float
-    """Largest motor torque [N m]; inf where there is none."""
+    driven: Driven
+    """What of the model its actuators drive, by name."""
     speed_limit: float
     """Largest wheel speed relative to the bus [rad/s]; inf where there is none."""
     momentum: slice
@@ -58,6 +57,11 @@ class Vehicle:
     """In ``sensordata``: kinetic energy [J]."""
     environment: slice
     """In ``sensordata``: force [N], inertial axes, and torque [N m], body axes, on the bus."""
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """The motors that actuators command, by name, in the order of the actuators."""
+        return self.driven.motors
 
 
 def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
@@ -68,34 +72,32 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
             rotor can be, or what ``guards.check`` refuses.
 
     Warns:
-        UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown as given.
+        UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown unchanged.
     """
     spec = composition.compose(table)
     spec.option.timestep = rates.physics
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
     spec.nuserdata = userdata
 
-    wheels = table.wheels
-    axes = mass_properties.unit_axes(wheels)
+    rotors = table.wheels.rotors
     if table.vehicle_mass is not None:
         gyrostat = np.array(table.vehicle_inertia)
         inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, _others(spec))
     else:
-        inertial, gyrostat = mass_properties.bus(
-            table, mass_properties.own_inertia(spec.body("bus"))
-        )
+        own = mass_properties.own_inertia(spec.body("bus"))
+        inertial, gyrostat = mass_properties.bus(table, rotors, own)
     model = _compile(spec, inertial)
     model_checks.check(model)
-    driven = table.drives if table.servos is None else indices.turned(model)
+    driven = Driven.together(_driven(model, table))
 
     return Vehicle(
         model=model,
         inertia=indices.frozen(gyrostat),
-        wheel_axes=indices.frozen(axes),
-        wheel_inertia=indices.frozen(np.full(len(axes), wheels.inertia)),
-        torque_limit=wheels.torque_limit or np.inf,
-        speed_limit=wheels.speed_limit or np.inf,
-        **indices.of(model, len(axes), driven, engine=table.engine is not None),
+        wheel_axes=indices.frozen(rotors.axes),
+        wheel_inertia=indices.frozen(np.full(len(rotors.axes), rotors.inertia)),
+        driven=driven,
+        speed_limit=table.wheels.speed_limit or np.inf,
+        **indices.of(model, driven),
     )
 
 
@@ -105,18 +107,13 @@ def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
     Raises:
         KeyError: ``model`` lacks one of the vehicle's joints or sensors.
     """
-    reaction_wheels = len(vehicle.wheel_axes)
-    hinges = [name for name in vehicle.motors if not indices.is_thruster(name)]
-    engine = tuple(hinges) == indices.ENGINE
-    driven = () if engine else hinges[reaction_wheels:]
-    found = indices.of(model, reaction_wheels, driven, engine=engine)
-    return replace(vehicle, model=model, **found)
+    return replace(vehicle, model=model, **indices.of(model, vehicle.driven))
 
 
 def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
     """Return (qpos, qvel), shapes (nq,) and (nv,), of the vehicle at time zero.
 
-    Wheel speeds for a wanted total momentum are solved with MuJoCo's own momentum matrix, so that
+    Wheel speeds for a desired total momentum are solved with MuJoCo's own momentum matrix, so that
     they hold for wheels anywhere in the bus; where more than three wheels can make it, the least.
 
     Raises:
@@ -178,10 +175,16 @@ def from_bytes(data: bytes) -> Any:
     return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": gzip.decompress(data)})
 
 
+def _driven(model: Any, table: PlantTable) -> Iterator[Driven]:
+    for key, fitted in table.equipment.items():
+        with input_error_at(f"plant.{key}"):
+            yield fitted.driven(model)
+
+
 def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
     body, moments = spec.body("bus"), inertial.inertia
     body.mass, body.ipos, _, body.iquat = inertial
-    body.fullinertia = np.full(6, np.nan)  # not given: the principal moments are
+    body.fullinertia = np.full(6, np.nan)  # unset: the principal moments hold
     excess = moments[2] - moments[1] - moments[0]
     # MuJoCo's compiler refuses what is not physical; its dynamics only need it positive.
     body.inertia = moments if excess <= 0.0 else np.full(3, moments.mean())
@@ -190,7 +193,7 @@ def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
         eigenvalues = np.array2string(moments, precision=4)
         warnings.warn(
             f"no mass distribution has the bus inertia's eigenvalues {eigenvalues} kg m^2: the "
-            f"largest exceeds the sum of the others by {excess:.4g}; flown as given",
+            f"largest exceeds the sum of the others by {excess:.4g}; flown unchanged",
             UnphysicalInertiaWarning,
             stacklevel=3,
         )
@@ -226,10 +229,10 @@ def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
     mujoco.mj_fwdPosition(vehicle.model, data)
     mujoco.mj_angmomMat(vehicle.model, data, matrix, bus)
     by_wheels = matrix[:, vehicle.wheel_dof]
-    wanted = momentum - matrix @ data.qvel
-    speeds: Array = np.linalg.lstsq(by_wheels, wanted, rcond=1e-10)[0]
-    missing = wanted - by_wheels @ speeds
-    if np.linalg.norm(missing) > 1e-9 * np.linalg.norm(wanted):
+    desired = momentum - matrix @ data.qvel
+    speeds: Array = np.linalg.lstsq(by_wheels, desired, rcond=1e-10)[0]
+    missing = desired - by_wheels @ speeds
+    if np.linalg.norm(missing) > 1e-9 * np.linalg.norm(desired):
         in_body = data.xmat[bus].reshape(3, 3).T @ missing
         raise ValueError(
             f"initial.momentum: the wheels' axes cannot make {in_body} N m s of it (body axes): "

@@ -3,12 +3,17 @@
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
+from mujoco.batch import Batch
 from scipy.integrate import simpson
 
 from mjspace import attitude
 from mjspace.actuators.actuator_set import ActuatorSet
+from mjspace.actuators.base import Actuator
+from mjspace.actuators.ideal_thrusters import IdealThrusters
+from mjspace.actuators.magnetorquers import CoilSet
 from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.contract import Measurement, TorqueCommand
 from mjspace.errors import FlightError
@@ -91,15 +96,65 @@ def test_a_law_that_forgets_one_is_told_so() -> None:
     ],
 )
 def test_a_misshapen_command_is_the_laws_fault(torque: Any, message: str) -> None:
-    together = ActuatorSet((ReactionWheels(np.eye(3)),))
+    wheels = ActuatorSet((ReactionWheels(np.eye(3)),))
     with pytest.raises(FlightError, match=f"the law's command: {message}"):
-        together.act({}, TorqueCommand(torque), TRUTH, 0.1)
+        wheels.act({}, TorqueCommand(torque), TRUTH, 0.1)
 
 
-def test_what_an_actuator_raises_is_not_blamed_on_the_law() -> None:
-    class Broken(ReactionWheels):
-        def act(self, state: Any, command: Any, truth: Any, step: float) -> Any:
-            raise KeyError("its own")
+class Broken(ReactionWheels):
+    def act(self, state: Any, command: Any, truth: Any, step: float) -> Any:
+        raise KeyError("its own")
 
-    with pytest.raises(KeyError, match="its own"):
-        ActuatorSet((Broken(np.eye(3)),)).act({}, TorqueCommand(np.zeros((2, 3))), TRUTH, 0.1)
+
+class Misshapen(ReactionWheels):
+    def act(self, state: Any, command: Any, truth: Any, step: float) -> Any:
+        return state, np.zeros((2, 4)), np.zeros((2, 3))
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        (
+            Broken,
+            r"the actuator Broken \(wheel_torque\) raised KeyError at test_actuator_set.py:\d+: ",
+        ),
+        (Misshapen, r"the actuator Misshapen applies .* of shape \(2, 4\): it must be \(2, 3\)"),
+    ],
+)
+def test_an_actuators_fault_is_reported_as_its_own(
+    kind: type[ReactionWheels], message: str
+) -> None:
+    with pytest.raises(FlightError, match=message):
+        ActuatorSet((kind(np.eye(3)),)).act({}, TorqueCommand(np.zeros((2, 3))), TRUTH, 0.1)
+
+
+@pytest.mark.parametrize("other", [ReactionWheels(np.eye(3)[:1]), CoilSet(np.eye(3))])
+def test_two_kinds_cannot_drive_the_same(other: Actuator) -> None:
+    ActuatorSet((IdealThrusters(), other))
+    for kind in (IdealThrusters(), other):
+        with pytest.raises(ValueError, match="both drive"):
+            ActuatorSet((kind, kind))
+
+
+class Coordinator(IdealThrusters):
+    logged_as = "wheel_torque"
+
+
+def test_two_kinds_cannot_be_logged_under_one_name() -> None:
+    with pytest.raises(ValueError, match=r"are both logged as command\.wheel_torque: give one"):
+        ActuatorSet((ReactionWheels(np.eye(3)), Coordinator()))
+
+
+def test_motors_are_found_by_name_and_stand_side_by_side() -> None:
+    joints = "".join(f'<body><joint name="{n}"/><geom size="1"/></body>' for n in "abc")
+    motors_in = "".join(f'<motor name="wheel_{i}" joint="{n}"/>' for i, n in ((2, "a"), (0, "b")))
+    xml = "<mujoco><worldbody>{}</worldbody><actuator>{}</actuator></mujoco>"
+    model = mujoco.MjModel.from_xml_string(
+        xml.format(joints, motors_in + '<motor name="wheel_1" joint="c"/>')
+    )
+    batch = Batch(model, 2, 1)
+    (view,) = ActuatorSet((ReactionWheels(np.eye(3)[:2]),)).inputs(batch)
+    view[:] = [[1.0, 2.0], [3.0, 4.0]]
+    assert batch.bind("ctrl").tolist() == [[0.0, 1.0, 2.0], [0.0, 3.0, 4.0]]
+    with pytest.raises(ValueError, match="must stand side by side and in order in ctrl"):
+        ActuatorSet((ReactionWheels(np.eye(3)),)).inputs(batch)

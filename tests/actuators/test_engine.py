@@ -1,28 +1,30 @@
 """An engine on two gimbals: throttle, valves, servos and tank, against closed forms."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
 
-from mjspace.actuators.engine import GimballedEngine
+from mjspace.actuators.base import Context
+from mjspace.actuators.engine import Engine, GimballedEngine
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement, ThrustCommand
-from mjspace.scenario.landing import Engine
+from mjspace.scenario.equipment import Driven
+from mjspace.scenario.plant import Initial, Rates
 
 STEP = 0.002  # s
 TANK = """<mujoco><worldbody><body name="tank">
   <inertial pos="0 0 0" mass="20" diaginertia="0.72 0.72 0.72"/></body></worldbody></mujoco>"""
+MODEL = mujoco.MjModel.from_xml_string(TANK)
 
 
-class Vehicle:
-    model = mujoco.MjModel.from_xml_string(TANK)
-
-
-def engine(**table: Any) -> GimballedEngine:
+def engine(*, gravity: float = 0.0, thrust: float | None = None, **table: Any) -> GimballedEngine:
+    vehicle: Any = SimpleNamespace(model=MODEL)
     numbers = {"thrust_max": 320.0, "thrust_min": 50.0} | table
-    return GimballedEngine.of(Vehicle(), Engine(**numbers))
+    context = Context(vehicle, Driven(), Rates(), Initial(thrust=thrust), gravity)
+    return Engine(**numbers).actuator(context)
 
 
 def seen(angle: Any = ((0.0, 0.0),), rate: Any = ((0.0, 0.0),)) -> Measurement:
@@ -80,7 +82,7 @@ def test_propellant_goes_with_thrust_over_exhaust_speed() -> None:
     assert 20.0 - state["propellant"][0, 0] == pytest.approx(used, rel=1e-10)
 
     body, left = flown.masses(state, state)["body_mass"]
-    assert Vehicle.model.body(body).name == "tank"
+    assert MODEL.body(body).name == "tank"
     assert left == state["propellant"][0]
     # the tank shrinks in mass, not in size
     np.testing.assert_allclose(flown.masses(state, state)["body_inertia"][1], 0.036 * left[0])
@@ -161,7 +163,7 @@ def test_it_starts_at_trim_or_as_it_is_told(
     propellant: float | None, thrust: float | None, starts: float
 ) -> None:
     """The vehicle is the tank alone, in 1.6 m/s^2; the throttle's range is 10 to 80 N."""
-    table = Engine(thrust_max=80.0, thrust_min=10.0, propellant=propellant)
-    flown = GimballedEngine.of(Vehicle(), table, gravity=1.6, thrust=thrust)
+    table = {"thrust_max": 80.0, "thrust_min": 10.0, "propellant": propellant}
+    flown = engine(gravity=1.6, thrust=thrust, **table)
     assert flown.reset(3)["thrust"] == pytest.approx(np.full((3, 1), starts))
-    assert GimballedEngine.of(Vehicle(), table).reset(1)["thrust"] == 0.0
+    assert engine(**table).reset(1)["thrust"] == 0.0

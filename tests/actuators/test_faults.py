@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mjspace.actuators.faults import FaultSet, between
+from mjspace.actuators.ideal_thrusters import IdealThrusters
 from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.contract import Array
 from mjspace.errors import InputError
@@ -31,7 +32,6 @@ def given(members: int = 1, **table: Any) -> tuple[Array, list[Any]]:
     faults = FaultSet(
         [Fault.model_validate({"motor": "wheel_1", **table})],
         wheels,
-        MOTORS,
         HOLD,
         seed=3,
         members=range(members),
@@ -70,7 +70,7 @@ def test_a_motor_gives_what_its_fault_says(kind: str, value: Any, wanted: Any) -
 def test_the_phase_in_the_log_is_0_before_1_while_it_lasts_and_2_after() -> None:
     wheels = [ReactionWheels(np.eye(3))]
     table = Fault.model_validate({"motor": "wheel_1", "kind": "dead", "at": 0.1, "until": 0.3})
-    faults = FaultSet([table], wheels, MOTORS, HOLD, seed=3, members=[0])
+    faults = FaultSet([table], wheels, HOLD, seed=3, members=[0])
     state, phases = faults.reset(), []
     for k in range(5):
         state, _ = faults.decide(state, k * HOLD, {})
@@ -87,7 +87,7 @@ def test_a_fault_that_is_over_before_its_signal_begins_never() -> None:
     table = {"motor": "wheel_1", "kind": "dead", "until": 0.2}
     table["when"] = {"signal": "truth.rate", "above": 1.0}
     fault = Fault.model_validate(table)
-    faults = FaultSet([fault], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0])
+    faults = FaultSet([fault], [ReactionWheels(np.eye(3))], HOLD, 0, [0])
     state, told = faults.reset(), []
     for k, rate in enumerate([0.5, 0.5, 2.0, 2.0]):
         seen = {"truth": SimpleNamespace(_asdict=lambda rate=rate: {"rate": np.array([[rate]])})}
@@ -99,9 +99,7 @@ def test_a_fault_that_is_over_before_its_signal_begins_never() -> None:
 
 def test_between_control_instants_no_signal_begins_a_fault() -> None:
     table = {"motor": "wheel_1", "kind": "dead", "when": {"signal": "truth.rate", "above": 1.0}}
-    faults = FaultSet(
-        [Fault.model_validate(table)], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0]
-    )
+    faults = FaultSet([Fault.model_validate(table)], [ReactionWheels(np.eye(3))], HOLD, 0, [0])
     state, happened = faults.decide(faults.reset(), 0.05, None)
     assert happened == []
     assert state["fault_phase"].tolist() == [[0.0]]
@@ -147,7 +145,7 @@ def test_noise_is_of_a_stream_that_no_sensor_has() -> None:
         np.testing.assert_array_equal(row[:, 1:2], RIGHT[k, 1] + 0.1 * expected(k))
     wheels = [ReactionWheels(np.eye(3))]
     tables = [Fault(motor=motor, kind="noisy", value=1.0, at=0.0) for motor in MOTORS[:2]]
-    faults = FaultSet(tables, wheels, MOTORS, HOLD, seed=3, members=[0])
+    faults = FaultSet(tables, wheels, HOLD, seed=3, members=[0])
     state, _ = faults.decide(faults.reset(), 0.0, {})
     _, (row,) = faults.change(state, (np.zeros((1, 3)),), 0.0)
     assert row[0, 1] == normals(3, [0], (1001,), 1)(0)[0, 0]
@@ -161,24 +159,23 @@ def test_a_fault_begins_when_any_topic_says_so() -> None:
         fault = Fault.model_validate(
             {"motor": "wheel_0", "kind": "dead", "when": {"signal": signal, "above": 3.5}}
         )
-        faults = FaultSet([fault], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0, 1])
+        faults = FaultSet([fault], [ReactionWheels(np.eye(3))], HOLD, 0, [0, 1])
         _, happened = faults.decide(faults.reset(), 0.0, seen)
         assert [vehicle for _, vehicle, *_ in happened] == began, signal
     # Of two vehicles each has two components.
     fault = Fault.model_validate(
         {"motor": "wheel_0", "kind": "dead", "when": {"signal": "truth.rate[2]", "above": 3.5}}
     )
-    faults = FaultSet([fault], [ReactionWheels(np.eye(3))], MOTORS, HOLD, 0, [0, 1])
+    faults = FaultSet([fault], [ReactionWheels(np.eye(3))], HOLD, 0, [0, 1])
     with pytest.raises(InputError, match=r"faults\.0\.when\.signal: .* has 2 components"):
         faults.decide(faults.reset(), 0.0, seen)
 
 
 def test_axes_of_a_torque_on_the_bus_are_its_motors() -> None:
-    thrusters: Any = SimpleNamespace(acts_on="qfrc_applied", logged_as="thruster_torque")
-    kinds: Any = [thrusters]
+    kinds = [IdealThrusters()]
     for name in ("thruster_torque", *(f"thruster_torque[{k}]" for k in range(3))):
         fault = Fault(motor=name, kind="scaled", value=2.0, at=0.0)
-        faults = FaultSet([fault], kinds, [], HOLD, 0, [0])
+        faults = FaultSet([fault], kinds, HOLD, 0, [0])
         state, _ = faults.decide(faults.reset(), 0.0, {})
         _, (torque,) = faults.change(state, (np.ones((1, 3)),), 0.0)
         expected = np.ones(3)
@@ -186,17 +183,17 @@ def test_axes_of_a_torque_on_the_bus_are_its_motors() -> None:
         assert torque.tolist() == [expected.tolist()]
     for unknown in ("thruster_torque[3]", "wheel_0", ""):
         with pytest.raises(ValueError, match=r"faults\.0\.motor: none is called"):
-            FaultSet([Fault(motor=unknown, kind="dead", at=0.0)], kinds, [], HOLD, 0, [0])
+            FaultSet([Fault(motor=unknown, kind="dead", at=0.0)], kinds, HOLD, 0, [0])
 
 
 def test_several_faults_act_one_after_the_other_on_any_kind_of_actuator() -> None:
-    thrusters: Any = SimpleNamespace(acts_on="qfrc_applied", logged_as="thruster_torque")
+    thrusters = IdealThrusters()
     tables = [
         Fault(motor="wheel_torque", kind="scaled", value=0.5, at=0.0),
         Fault(motor="wheel_torque[2]", kind="biased", value=1.0, at=0.0),
         Fault(motor="thruster_torque[0]", kind="dead", at=0.0),
     ]
-    faults = FaultSet(tables, [ReactionWheels(np.eye(3)), thrusters], MOTORS, HOLD, 0, [0])
+    faults = FaultSet(tables, [ReactionWheels(np.eye(3)), thrusters], HOLD, 0, [0])
     state, _ = faults.decide(faults.reset(), 0.0, {})
     one = np.ones((1, 3))
     _, (wheels, torque) = faults.change(state, (one, one), 0.0)

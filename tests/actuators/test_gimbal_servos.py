@@ -1,20 +1,21 @@
 """Speed loops on gimbals and wheels: their limits, and the pyramid of CMGs that they turn."""
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from mjspace.controllers.cmg.cmg_steering import Cluster, momentum
 
-from mjspace.actuators.gimbal_servos import GimbalServos
+from mjspace.actuators.base import Context
+from mjspace.actuators.driven_hinges import gimbals_and_wheels
+from mjspace.actuators.gimbal_servos import GimbalServos, Servos
 from mjspace.contract import Array, GimbalRateCommand, Measurement
 from mjspace.errors import FlightError, InputError
 from mjspace.runner.replay import verify
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
-from mjspace.scenario.servos import Servos
+from mjspace.scenario.plant import Initial, Rates
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
@@ -26,8 +27,10 @@ NONE = np.zeros((1, 0))
 
 def servos(**table: Any) -> GimbalServos:
     """Return the loops of two CMGs whose motors are gimbal, wheel, gimbal, wheel."""
-    vehicle: Any = SimpleNamespace(gimbal_dof=[6, 8], wheel_dof=[7, 9], drive_dof=[6, 7, 8, 9])
-    return GimbalServos.of(vehicle, Servos(**{"wheel_speed": 500.0} | table))
+    driven = gimbals_and_wheels(["a", "a_wheel", "b", "b_wheel"])
+    vehicle: Any = None  # nothing of it but the hinges matters
+    context = Context(vehicle, driven, Rates(), Initial())
+    return Servos(**{"wheel_speed": 500.0} | table).actuator(context)
 
 
 def act(
@@ -146,7 +149,7 @@ def test_a_log_is_flown_again_bit_for_bit(tmp_path: Path) -> None:
 
 
 def test_what_cannot_fly_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"one kind of motor: set wheels\.axes"):
+    with pytest.raises(InputError, match=r"servos and wheels are both given: set wheels\.axes"):
         load("cmg-slew", ["plant.wheels.axes=[[1,0,0]]"])
     drive = "{pole_pairs=1, resistance=1, inductance=1, torque_constant=1}"
     with pytest.raises(InputError, match="drives and servos are both given: give one"):

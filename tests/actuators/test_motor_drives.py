@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjspace.actuators.motor_drives import DriveTables
 from mjspace.environment import install
 from mjspace.errors import FlightError, InputError
 from mjspace.log.reader import Log
@@ -125,8 +126,8 @@ def test_ripple_is_a_torque_on_its_hinge_and_against_what_carries_it() -> None:
 
 def test_a_motor_without_a_drive_is_refused() -> None:
     scenario, folder = load("dgvscmg-tracking")
-    drives = {k: v for k, v in scenario.plant.drives.items() if k != "cmg_inner"}
-    plant = scenario.plant.model_copy(update={"drives": drives})
+    drives = {k: v for k, v in scenario.plant.drives.root.items() if k != "cmg_inner"}
+    plant = scenario.plant.model_copy(update={"drives": DriveTables(drives)})
     with pytest.raises(InputError, match=r"plant\.drives: cmg_inner has a motor and no drive"):
         assemble(scenario.model_copy(update={"plant": plant}), folder)
 
@@ -134,7 +135,11 @@ def test_a_motor_without_a_drive_is_refused() -> None:
 @pytest.mark.parametrize(
     ("scenario", "override", "message"),
     [
-        ("dgvscmg-tracking", "plant.wheels.axes=[[1,0,0]]", "one kind of motor: set wheels.axes"),
+        (
+            "dgvscmg-tracking",
+            "plant.wheels.axes=[[1,0,0]]",
+            "drives and wheels are both given: set wheels.axes",
+        ),
         ("dgvscmg-tracking", "plant.engine={thrust_max=1}", "give one"),
         (
             "dgvscmg-tracking",

@@ -7,8 +7,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.integrate import solve_ivp
 
-from mjspace.actuators.pmsm import Drives
-from mjspace.scenario.motors import Pmsm
+from mjspace.actuators.pmsm import Drives, Pmsm
 from mjspace.units import to_si
 
 GIMBAL = Pmsm(pole_pairs=4, resistance=2.5, inductance=4.5e-3, torque_constant=1.5)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mjspace.actuators.thrusters import Thrusters
+from mjspace.actuators.base import Context
+from mjspace.actuators.thrusters import Rcs, Thrusters
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement, PulseCommand
-from mjspace.scenario.plant import PlantTable, Rates
-from mjspace.scenario.thrusters import Rcs
+from mjspace.scenario.equipment import Driven
+from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.vehicle.vehicle import build, on_model
 
 STEP, PERIOD, FORCE = 0.005, 0.02, 2.0  # s, s, N
@@ -22,11 +23,12 @@ NOTHING = np.zeros((1, 0))
 TRUTH = Measurement(NOTHING, NOTHING, NOTHING, thrust=NOTHING, propellant=NOTHING)
 
 
-def thrusters(count: int = 1, **table: Any) -> Thrusters:
+def thrusters(count: int = 1, **keys: Any) -> Thrusters:
     rows = [[0.0, 0.0, 0.0]] * count
-    given = Rcs(positions=rows, directions=[[1.0, 0.0, 0.0]] * count, thrust=FORCE, **table)
+    table = Rcs(positions=rows, directions=[[1.0, 0.0, 0.0]] * count, thrust=FORCE, **keys)
     vehicle: Any = SimpleNamespace(model=mujoco.MjModel.from_xml_string(TANK))
-    return Thrusters.of(vehicle, given, Rates(physics=STEP, control=PERIOD))
+    rates = Rates(physics=STEP, control=PERIOD)
+    return table.actuator(Context(vehicle, Driven(), rates, Initial()))
 
 
 def fire(flown: Thrusters, on_times: list[float], periods: int) -> tuple[Any, Array, Array]:
@@ -52,11 +54,11 @@ def test_a_valve_that_closes_within_a_step_gives_that_part_of_its_thrust() -> No
 def test_a_pulse_comes_late_by_the_delay_and_whole(delay: float) -> None:
     _, impulse, _ = fire(thrusters(delay=delay), [0.0125, 0.0, 0.004], 7)
     edges = STEP * np.arange(len(impulse) + 1)
-    wanted = sum(
+    expected = sum(
         np.diff(np.clip(edges - begin - delay, 0.0, on))
         for begin, on in ((0.0, 0.0125), (0.04, 0.004))
     )
-    np.testing.assert_allclose(impulse / FORCE, wanted, atol=1e-14)
+    np.testing.assert_allclose(impulse / FORCE, expected, atol=1e-14)
 
 
 def test_whole_periods_join_into_one_pulse() -> None:
@@ -98,7 +100,7 @@ def test_propellant_goes_with_impulse_over_exhaust_speed() -> None:
     np.testing.assert_allclose(
         flown.masses(state, state)["body_inertia"][1], 0.02 * state["rcs_propellant"] * np.ones(3)
     )
-    assert flown.seen(state, TRUTH).propellant == state["rcs_propellant"]
+    assert flown.measured(state, TRUTH).propellant == state["rcs_propellant"]
 
 
 def test_an_empty_tank_ends_it_with_its_last_gram() -> None:
@@ -113,7 +115,7 @@ def test_an_empty_tank_ends_it_with_its_last_gram() -> None:
 def test_what_burns_nothing_weighs_the_same() -> None:
     flown = thrusters()
     assert flown.masses(flown.reset(1), flown.reset(1)) == {}
-    assert flown.seen(flown.reset(1), TRUTH).propellant.size == 0
+    assert flown.measured(flown.reset(1), TRUTH).propellant.size == 0
 
 
 def test_what_no_period_holds_is_cut() -> None:

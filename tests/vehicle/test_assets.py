@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from mjspace import attitude
+from mjspace.actuators.reaction_wheels import Wheels
 from mjspace.contract import Array
 from mjspace.errors import NoRendererError
 from mjspace.rendering.offscreen import Canvas
-from mjspace.scenario.plant import Initial, Part, PlantTable, Rates, Wheels
+from mjspace.scenario.plant import Initial, Part, PlantTable, Rates
 from mjspace.vehicle import vehicle as plant
 
 ASSETS = Path(__file__).parents[2] / "assets"

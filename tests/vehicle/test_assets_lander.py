@@ -8,12 +8,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjspace.actuators.reaction_wheels import Wheels
 from mjspace.contract import Array
 from mjspace.errors import NoRendererError
 from mjspace.rendering import plume
 from mjspace.rendering.offscreen import Canvas
 from mjspace.scenario.landing import Ground
-from mjspace.scenario.plant import PlantTable, Wheels
+from mjspace.scenario.plant import PlantTable
 from mjspace.vehicle import composition
 
 ASSETS = Path(__file__).parents[2] / "assets"

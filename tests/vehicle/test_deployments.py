@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mjspace import attitude
+from mjspace.actuators.reaction_wheels import Wheels
 from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.log.reader import Log
@@ -15,7 +16,7 @@ from mjspace.runner.replay import verify
 from mjspace.runner.run import run
 from mjspace.scenario.deployments import Deployment
 from mjspace.scenario.loading import load
-from mjspace.scenario.plant import Part, PlantTable, Rates, Wheels
+from mjspace.scenario.plant import Part, PlantTable, Rates
 from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly

@@ -8,9 +8,8 @@ from mjspace.controllers.motors.motor_bench import SpeedBench
 from mjspace.controllers.motors.motor_loops import CurrentLoop, SpeedLoop, estimates
 from numba import njit
 
-from mjspace.actuators.pmsm import Drives
+from mjspace.actuators.pmsm import Drives, Pmsm
 from mjspace.contract import Measurement, Reference
-from mjspace.scenario.motors import Pmsm
 
 J, P, R, L, KM = 0.016, 6.0, 3.0, 6e-3, 2.0  # Table 4.1
 AMPLITUDE, RATE = 20.0, np.pi / 2.0
