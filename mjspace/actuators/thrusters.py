@@ -1,58 +1,40 @@
 """Reaction-control thrusters: valves with a delay and a least pulse, thrust with a lag, a tank."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 from typing import Annotated, Any, ClassVar
 
-import mujoco
 import numpy as np
 from numba import guvectorize
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from mjspace.actuators import tank as tanks
 from mjspace.actuators.base import (
     Actuator,
-    ActuatorTable,
     Context,
     Fields,
     Input,
     State,
     motors,
 )
+from mjspace.actuators.thruster_layout import ThrusterTable, names
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
-from mjspace.scenario.equipment import Driven
-from mjspace.scenario.fields import Meters3, Positive, Seconds, Si, Table, Time, Unit3
-from mjspace.vehicle.vehicle import Vehicle
+from mjspace.scenario.fields import Positive, Seconds, Si, Time
 
 FIELDS = ("rcs_thrust", "rcs_open", "rcs_on_time", "rcs_asked", "rcs_step", "rcs_propellant")
 _ROUNDING = 1e-12
 """s: pulses that are closer than this are one."""
 _HYDRAZINE = 1010.0  # kg/m^3 at 20 deg C
-_HIDDEN = 5  # a group of sites that no picture shows
-_NOZZLE_AND_PLUME = (
-    # name, shape, size [m], how far out its centre is [m], color
-    ("nozzle", mujoco.mjtGeom.mjGEOM_CYLINDER, [0.03, 0.035, 0.0], 0.03, [0.15, 0.15, 0.17, 1.0]),
-    ("plume", mujoco.mjtGeom.mjGEOM_ELLIPSOID, [0.06, 0.06, 0.26], 0.3, [0.5, 0.72, 1.0, 0.0]),
-)
 
 
-class Rcs(ActuatorTable, Table):
+class Rcs(ThrusterTable):
     """On/off thrusters that are all alike, one for each row of ``positions``.
 
     Their command is an ``on_time`` for each, of the control period that begins. Propellant is in a
     spherical tank at the body origin, full of hydrazine at first; it loses mass and keeps its size.
     """
 
-    positions: Annotated[list[Meters3], Field(min_length=1)]
-    """Where each pushes, body axes."""
-    directions: list[Unit3]
-    """Of each one's force on the vehicle, body axes; normalized."""
-    thrust: Annotated[Positive, Si("N")]
-    """Of each, steady."""
-    minimum_on: Time = 0.0
-    """A valve that opens stays open at least that long, even if commanded for less."""
     delay: Time = 0.0
     """From the command to the valve, for opening and closing alike."""
     rise: Time = 0.0
@@ -63,46 +45,17 @@ class Rcs(ActuatorTable, Table):
     """In the tank at the start; goes with ``specific_impulse``."""
 
     @model_validator(mode="after")
-    def _consistent(self) -> "Rcs":
-        if len(self.directions) != len(self.positions):
-            raise ValueError(
-                f"directions: {len(self.directions)} rows for {len(self.positions)} positions: "
-                "give as many"
-            )
+    def _both_or_neither(self) -> "Rcs":
         if (self.specific_impulse is None) != (self.propellant is None):
             raise ValueError("specific_impulse and propellant: give both or neither")
         return self
 
-    @property
-    def unit_directions(self) -> list[list[float]]:
-        """``directions``, each of length one."""
-        rows = np.array(self.directions)
-        unit: list[list[float]] = (rows / np.linalg.norm(rows, axis=1, keepdims=True)).tolist()
-        return unit
-
     def attach(self, spec: Any) -> None:
-        """Add a site, a motor, a nozzle and a plume for each thruster, and the tank."""
-        spec.add_material(name="thruster", emission=0.8)
-        for index, (place, way) in enumerate(
-            zip(self.positions, self.unit_directions, strict=True)
-        ):
-            _attach_thruster(spec, f"thruster_{index}", place, way)
+        """Add the thrusters and the tank."""
+        super().attach(spec)
         if self.propellant is not None:
             radius = np.cbrt(self.propellant / (4.0 / 3.0 * np.pi * _HYDRAZINE))
             tanks.add_sphere(spec, "rcs_tank", self.propellant, radius)
-
-    def driven(self, model: Any) -> Driven:
-        """Return its motors."""
-        return Driven(motors=_names(len(self.positions)))
-
-    def facts(self, vehicle: Vehicle) -> dict[str, Any]:
-        """Return where each thruster pushes and how, its force [N] and its shortest pulse [s]."""
-        return {
-            "thruster_positions": np.array(self.positions),
-            "thruster_directions": np.array(self.unit_directions),
-            "thruster_force": np.full(len(self.positions), self.thrust),
-            "thruster_minimum_on": self.minimum_on,
-        }
 
     def actuator(self, context: Context) -> "Thrusters":
         """Return the thrusters of a vehicle that was composed with them."""
@@ -118,29 +71,6 @@ class Rcs(ActuatorTable, Table):
         data = np.array([self.thrust, flow, *valve, period, float(steps)])
         memory = 1 + ceil(self.delay / period - 1e-9)
         return Thrusters(data, len(self.positions), memory, tank, full, self.propellant or 0.0)
-
-
-def _names(count: int) -> tuple[str, ...]:
-    return tuple(f"thruster_{index}" for index in range(count))
-
-
-def push_on_bus(spec: Any, name: str, place: Sequence[float], way: Sequence[float]) -> None:
-    """Add a motor of that name that pushes on the bus at ``place`` [m] along ``way``, body axes."""
-    spec.body("bus").add_site(name=name, pos=place, group=_HIDDEN)
-    site = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": name}
-    spec.add_actuator(name=name, gear=[*way, 0.0, 0.0, 0.0], **site)
-
-
-def _attach_thruster(spec: Any, name: str, place: list[float], way: list[float]) -> None:
-    """Let a thruster push on the bus; its plume is hidden until a picture shows it."""
-    push_on_bus(spec, name, place, way)
-    out = -np.array(way)
-    for drawn, kind, size, ahead, color in _NOZZLE_AND_PLUME:
-        geom = spec.body("bus").add_geom(type=kind, size=size, pos=place + ahead * out, rgba=color)
-        geom.name, geom.group, geom.mass = f"{name}_{drawn}", 2, 0.0
-        geom.contype = geom.conaffinity = 0
-        geom.material = "thruster" if drawn == "plume" else ""
-        mujoco.mju_quatZ2Vec(geom.quat, out)
 
 
 @dataclass(frozen=True)
@@ -173,7 +103,7 @@ class Thrusters(Actuator):
     @property
     def drives(self) -> Input:
         """Its motors."""
-        return motors(_names(self.count))
+        return motors(names(self.count))
 
     @property
     def takes(self) -> Fields:

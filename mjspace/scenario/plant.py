@@ -129,6 +129,8 @@ class PlantTable(Table):
     out."""
     rcs: Annotated[Any, DeclaredIn("mjspace.actuators.thrusters:Rcs")] = None
     """Its reaction-control thrusters; none when left out."""
+    cold_gas: Annotated[Any, DeclaredIn("mjspace.actuators.cold_gas:ColdGas")] = None
+    """Its cold-gas thrusters, in place of ``rcs``; none when left out."""
     magnetorquers: Annotated[Any, DeclaredIn("mjspace.actuators.magnetorquers:Magnetorquers")] = (
         None
     )

@@ -1,0 +1,185 @@
+"""Cold-gas thrusters without a regulator: thrust falls with the tank's pressure as gas is spent.
+
+G. P. Sutton, O. Biblarz, "Rocket Propulsion Elements", 8th edition, 2010, chapter 3: a choked
+nozzle lets pass a flow proportional to p / sqrt(T), (3-24), and thrusts with C_F A p, (3-31), p and
+T the tank's. With x the share of the gas that is left, an ideal gas that expands as a polytrope of
+exponent n has p / p0 = x^n and T / T0 = x^(n - 1), so that for u open valves
+
+    x' = -u x^((n + 1)/2) F0 / (m0 c0),    F = F0 x^n,    c = c0 x^((n - 1)/2),
+
+where F0 is the thrust and c0 = g0 Isp the exhaust speed with the full tank, of m0 kilograms. A step
+with a total opening of u t seconds has a closed form, used here, for mass and impulse:
+
+    x = exp(-u t F0 / (m0 c0))                                      (n = 1, isothermal)
+    x^(-(n - 1)/2) = 1 + (n - 1)/2 u t F0 / (m0 c0)                 (n > 1)
+    impulse = m0 c0 2/(n + 1) (1 - x^((n + 1)/2)).
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from numba import guvectorize
+from pydantic import Field
+
+from mjspace.actuators import tank as tanks
+from mjspace.actuators.base import Actuator, Context, Fields, Input, State, motors
+from mjspace.actuators.thruster_layout import ThrusterTable, names
+from mjspace.constants import STANDARD_GRAVITY
+from mjspace.contract import Array, Measurement
+from mjspace.scenario.fields import Positive, Seconds, Si
+
+
+class ColdGas(ThrusterTable):
+    """On/off cold-gas thrusters on one tank; all are alike, and ``thrust`` is of a full tank.
+
+    Their command is an ``on_time`` for each, of the control period that begins. The gas fills a
+    sphere at the body origin; its pressure falls as it is spent, and the thrust with it.
+    """
+
+    excludes: ClassVar[tuple[str, ...]] = ("rcs",)
+
+    specific_impulse: Seconds
+    """Thrust over the weight of the gas's flow, on Earth, of a full tank."""
+    gas: Annotated[Positive, Si("kg")]
+    """In the tank at the start."""
+    exponent: Annotated[Positive, Field(ge=1, le=5 / 3)] = 1.0
+    """Of the polytrope that the gas in the tank follows: 1 where the tank keeps it at its
+    temperature; its ratio of specific heats, 1.4 for nitrogen, where no heat reaches it."""
+    tank_radius: Annotated[Positive, Si("m")] = 0.1
+    """Of the sphere."""
+
+    def attach(self, spec: Any) -> None:
+        """Add the thrusters and the tank."""
+        super().attach(spec)
+        tanks.add_sphere(spec, "cold_gas_tank", self.gas, self.tank_radius)
+
+    def actuator(self, context: Context) -> "ColdGasThrusters":
+        """Return the thrusters of a vehicle that was composed with them."""
+        rates, model = context.rates, context.vehicle.model
+        period, steps = (rates.physics, 1) if context.inner else (rates.control, rates.steps)
+        if self.minimum_on > period:
+            raise ValueError(
+                f"plant.cold_gas.minimum_on: {self.minimum_on:g} s is longer than the {period:g} s "
+                "for which a command holds: make it shorter"
+            )
+        tank = model.body("cold_gas_tank").id
+        speed = self.specific_impulse * STANDARD_GRAVITY
+        valve = [self.minimum_on, period, float(steps)]
+        data = np.array([self.thrust, speed, self.gas, self.exponent, *valve])
+        return ColdGasThrusters(
+            data, len(self.positions), tank, model.body_inertia[tank] / self.gas
+        )
+
+
+@dataclass(frozen=True)
+class ColdGasThrusters(Actuator):
+    """On/off thrusters that obey a ``PulseCommand``, on a tank that blows down.
+
+    A pulse begins with its control period, or with the integration step for which an inner loop
+    commands it, and ends within it. The impulse of each integration step is exact; thrusters that
+    are open for different parts of a step share it by their times.
+    """
+
+    data: Array
+    """The thrusters' numbers, in the order that the kernel reads them."""
+    count: int
+    tank: int
+    """The body whose mass is the gas's."""
+    full: Array
+    """Principal moments [kg m^2] of that body for each kilogram in it, shape (3,)."""
+
+    logged_as: ClassVar[str] = "thruster_thrust"
+    unit: ClassVar[str] = "N"
+    measures: ClassVar[dict[str, str]] = {"propellant": "kg"}
+    stateful: ClassVar[bool] = True
+
+    @property
+    def takes(self) -> Fields:
+        """The on-time of each thruster."""
+        return {"on_time": (self.count, "s")}
+
+    @property
+    def drives(self) -> Input:
+        """Their motors."""
+        return motors(names(self.count))
+
+    def reset(self, vehicles: int) -> State:
+        """Return a full tank: "cold_gas" [kg], and "cold_gas_step", steps in the period; (N, 1)."""
+        gas, step = np.full((vehicles, 1), self.data[2]), np.zeros((vehicles, 1))
+        return {"cold_gas": gas, "cold_gas_step": step}
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, Array, Array]:
+        """Return (state, mean thrust [N], saturated), (N, n).
+
+        A thruster is saturated when its on-time is no part of the control period or shorter than
+        the least pulse.
+        """
+        on_time = np.asarray(command.on_time, dtype=float)
+        gas, count, mean, saturated = _blow_down.ufunc(
+            on_time, state["cold_gas"], state["cold_gas_step"], self.data, step
+        )
+        return {"cold_gas": gas, "cold_gas_step": count}, mean, saturated
+
+    def measured(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth with the gas that is left, after an engine's propellant."""
+        left = np.concatenate([truth.propellant, state["cold_gas"]], axis=-1)
+        return truth._replace(propellant=left)
+
+    def masses(self, before: State, after: State) -> dict[str, tuple[int, Array]]:
+        """Return mass and inertia of the tank."""
+        return tanks.masses(self.tank, self.full, before["cold_gas"], after["cold_gas"])
+
+    def account_propellant(
+        self, state: State, applied: Array, instead: Array, step: float
+    ) -> tuple[State, Array]:
+        """Return (state, thrust) where faults have made ``instead`` of what ``act`` applied.
+
+        The difference leaves with the exhaust speed of the moment, and an empty tank has no thrust.
+        """
+        left, (_, speed, full, exponent, *_) = state["cold_gas"], self.data
+        instead = np.where(left > 0.0, instead, 0.0)
+        exhaust = speed * (np.maximum(left, tanks.DRY) / full) ** (0.5 * (exponent - 1.0))
+        spent = np.sum(instead - applied, axis=-1, keepdims=True) * step / exhaust
+        return state | {"cold_gas": np.maximum(left - spent, 0.0)}, instead
+
+
+@guvectorize(
+    ["void(f8[:],f8[:],f8[:],f8[:],f8,f8[:],f8[:],f8[:],f8[:])"],
+    "(n),(o),(o),(d),()->(o),(o),(n),(n)",
+    cache=True,
+)
+def _blow_down(
+    on_time: Any,
+    gas: Any,
+    count: Any,
+    data: Any,
+    step: Any,
+    gas_after: Any,
+    count_after: Any,
+    mean: Any,
+    saturated: Any,
+) -> None:
+    """Advance the tank by ``step`` [s]; compute each thruster's mean thrust [N]."""
+    force, speed, full, exponent, least, period, steps = data
+    total = 0.0
+    for i in range(on_time.size):
+        commanded = on_time[i]
+        short = 0.0 < commanded < least
+        applied = least if short else min(max(commanded, 0.0), period)
+        mean[i] = min(max(applied - count[0] * step, 0.0), step)
+        total += mean[i]
+        saturated[i] = 1.0 if short or commanded < 0.0 or commanded > period + 1e-12 else 0.0
+    before, spent = gas[0] / full, total * force / (full * speed)
+    half = 0.5 * (exponent - 1.0)
+    # The logarithm of what is left: differences of powers would lose the digits of short pulses.
+    fall = spent if half == 0.0 else np.log1p(half * spent * before**half) / half
+    after = before * np.exp(-fall)
+    share = -np.expm1(-(half + 1.0) * fall) / (half + 1.0)
+    impulse = full * speed * before ** (half + 1.0) * share
+    for i in range(on_time.size):
+        mean[i] *= impulse / (total * step) if total > 0.0 else 0.0
+    gas_after[0] = full * after
+    count_after[0] = 0.0 if count[0] + 1.0 >= steps else count[0] + 1.0

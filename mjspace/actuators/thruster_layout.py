@@ -1,0 +1,88 @@
+"""Where on/off thrusters are and which way they push: what the tables of all kinds have."""
+
+from typing import Annotated, Any, Self
+
+import mujoco
+import numpy as np
+from pydantic import Field, model_validator
+
+from mjspace.actuators.base import ActuatorTable
+from mjspace.scenario.equipment import Driven
+from mjspace.scenario.fields import Meters3, Positive, Si, Table, Time, Unit3
+from mjspace.vehicle.vehicle import Vehicle
+
+_HIDDEN = 5  # a group of sites that no picture shows
+_NOZZLE_AND_PLUME = (
+    # name, shape, size [m], how far out its centre is [m], color
+    ("nozzle", mujoco.mjtGeom.mjGEOM_CYLINDER, [0.03, 0.035, 0.0], 0.03, [0.15, 0.15, 0.17, 1.0]),
+    ("plume", mujoco.mjtGeom.mjGEOM_ELLIPSOID, [0.06, 0.06, 0.26], 0.3, [0.5, 0.72, 1.0, 0.0]),
+)
+
+
+class ThrusterTable(ActuatorTable, Table):
+    """Base of the tables of on/off thrusters that are all alike."""
+
+    positions: Annotated[list[Meters3], Field(min_length=1)]
+    """Where each pushes, body axes."""
+    directions: list[Unit3]
+    """Of each one's force on the vehicle, body axes; normalized."""
+    thrust: Annotated[Positive, Si("N")]
+    """Of each, steady."""
+    minimum_on: Time = 0.0
+    """A valve that opens stays open at least that long, even if commanded for less."""
+
+    @model_validator(mode="after")
+    def _a_direction_for_each(self) -> Self:
+        if len(self.directions) != len(self.positions):
+            raise ValueError(
+                f"directions: {len(self.directions)} rows for {len(self.positions)} positions: "
+                "give as many"
+            )
+        return self
+
+    @property
+    def unit_directions(self) -> list[list[float]]:
+        """``directions``, each of length one."""
+        rows = np.array(self.directions)
+        unit: list[list[float]] = (rows / np.linalg.norm(rows, axis=1, keepdims=True)).tolist()
+        return unit
+
+    def attach(self, spec: Any) -> None:
+        """Add a site, a motor, a nozzle and a plume for each thruster."""
+        spec.add_material(name="thruster", emission=0.8)
+        places = zip(self.positions, self.unit_directions, strict=True)
+        for name, (place, way) in zip(names(len(self.positions)), places, strict=True):
+            _attach_thruster(spec, name, place, way)
+
+    def driven(self, model: Any) -> Driven:
+        """Return their motors."""
+        return Driven(motors=names(len(self.positions)))
+
+    def facts(self, vehicle: Vehicle) -> dict[str, Any]:
+        """Return where each thruster pushes and how, its force [N] and its shortest pulse [s]."""
+        return {
+            "thruster_positions": np.array(self.positions),
+            "thruster_directions": np.array(self.unit_directions),
+            "thruster_force": np.full(len(self.positions), self.thrust),
+            "thruster_minimum_on": self.minimum_on,
+        }
+
+
+def names(count: int) -> tuple[str, ...]:
+    """Return the names of that many thrusters' motors."""
+    return tuple(f"thruster_{index}" for index in range(count))
+
+
+def _attach_thruster(spec: Any, name: str, place: list[float], way: list[float]) -> None:
+    """Let a thruster push on the bus at its place; its plume is hidden until a picture shows it."""
+    bus = spec.body("bus")
+    bus.add_site(name=name, pos=place, group=_HIDDEN)
+    site = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": name}
+    spec.add_actuator(name=name, gear=[*way, 0.0, 0.0, 0.0], **site)
+    out = -np.array(way)
+    for drawn, kind, size, ahead, color in _NOZZLE_AND_PLUME:
+        geom = bus.add_geom(type=kind, size=size, pos=place + ahead * out, rgba=color)
+        geom.name, geom.group, geom.mass = f"{name}_{drawn}", 2, 0.0
+        geom.contype = geom.conaffinity = 0
+        geom.material = "thruster" if drawn == "plume" else ""
+        mujoco.mju_quatZ2Vec(geom.quat, out)

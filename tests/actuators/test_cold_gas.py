@@ -1,0 +1,159 @@
+"""Cold-gas thrusters: mass, pressure and impulse of a tank that blows down, in closed form."""
+
+from importlib import resources
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from mjspace.actuators.base import Context
+from mjspace.actuators.cold_gas import ColdGas, ColdGasThrusters
+from mjspace.constants import STANDARD_GRAVITY
+from mjspace.contract import Array, Measurement, PulseCommand
+from mjspace.errors import InputError
+from mjspace.runner.replay import verify
+from mjspace.runner.run import fly_to_log
+from mjspace.scenario.equipment import Driven
+from mjspace.scenario.loading import load, validate
+from mjspace.scenario.plant import Initial, Rates
+from mjspace.simulation.assembly import assemble
+
+STEP, PERIOD, FORCE, ISP, GAS = 0.005, 0.02, 2.0, 70.0, 0.05  # s, s, N, s, kg
+SPEED = ISP * STANDARD_GRAVITY
+TANK = """<mujoco><worldbody><body name="cold_gas_tank">
+  <inertial pos="0 0 0" mass="0.05" diaginertia="2e-4 2e-4 2e-4"/></body></worldbody></mujoco>"""
+NOTHING = np.zeros((1, 0))
+TRUTH = Measurement(NOTHING, NOTHING, NOTHING, thrust=NOTHING, propellant=NOTHING)
+
+
+def thrusters(count: int = 1, **keys: Any) -> ColdGasThrusters:
+    table = ColdGas(
+        positions=[[0.0, 0.0, 0.0]] * count, directions=[[1.0, 0.0, 0.0]] * count, thrust=FORCE,
+        specific_impulse=ISP, gas=GAS, **keys,
+    )  # fmt: skip
+    vehicle: Any = SimpleNamespace(model=mujoco.MjModel.from_xml_string(TANK))
+    rates = Rates(physics=STEP, control=PERIOD)
+    return table.actuator(Context(vehicle, Driven(), rates, Initial()))
+
+
+def fire(flown: ColdGasThrusters, on_times: Any) -> tuple[Any, Array, Array]:
+    """Return (state, impulse of each step [N s], saturated) of periods with these on-times."""
+    state, impulses, cuts = flown.reset(1), [], []
+    for on in on_times:
+        for _ in range(4):
+            state, mean, cut = flown.act(state, PulseCommand(np.atleast_2d(on)), TRUTH, STEP)
+            impulses.append(mean[0] * STEP)
+            cuts.append(cut[0])
+    return state, np.array(impulses), np.array(cuts)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.4, 5.0 / 3.0])
+def test_mass_and_pressure_after_many_pulses_are_those_of_the_closed_form(exponent: float) -> None:
+    pulses, on = 500, 0.0125
+    state, impulse, _ = fire(thrusters(exponent=exponent), [on] * pulses)
+    left = state["cold_gas"][0, 0] / GAS
+    open_for = pulses * on * FORCE / (GAS * SPEED)  # in time constants of the tank
+    half = 0.5 * (exponent - 1.0)
+    expected = (1.0 + half * open_for) ** (-1.0 / half) if half else np.exp(-open_for)
+    assert left == pytest.approx(expected, rel=1e-12)
+    assert 0.6 < left < 0.75
+    # The next instant's thrust is that of the pressure, p/p0 = x^n.
+    opened = PulseCommand(np.full((1, 1), on))
+    _, mean, _ = thrusters(exponent=exponent).act(state, opened, TRUTH, 1e-9)
+    assert mean[0, 0] == pytest.approx(FORCE * expected**exponent, rel=1e-9)
+    # Impulse is what the gas carries away: of an isothermal tank at a constant speed.
+    if exponent == 1.0:
+        assert impulse.sum() == pytest.approx(SPEED * GAS * (1.0 - left), rel=1e-12)
+
+
+def test_a_long_burn_follows_the_equations_of_flow_and_thrust() -> None:
+    exponent, on = 1.4, 3.0
+
+    def rates(time: float, y: Array) -> Array:
+        """Return flow and thrust, p / sqrt(T) and p in units of the full tank's, with p = m T."""
+        temperature = y[0] ** (exponent - 1.0)
+        pressure = y[0] * temperature
+        flow = pressure / np.sqrt(temperature) * FORCE / (GAS * SPEED)
+        return np.array([-flow, FORCE * pressure])
+
+    solved = solve_ivp(rates, (0.0, on), [1.0, 0.0], rtol=1e-11, atol=1e-13)
+    state, impulse, _ = fire(thrusters(exponent=exponent), [PERIOD] * round(on / PERIOD))
+    assert state["cold_gas"][0, 0] / GAS == pytest.approx(solved.y[0, -1], rel=1e-9)
+    assert impulse.sum() == pytest.approx(solved.y[1, -1], rel=1e-9)
+
+
+def test_a_valve_closes_within_a_step_and_the_least_pulse_is_kept() -> None:
+    flown = thrusters(minimum_on=0.0075)
+    _, impulse, cut = fire(flown, [0.0125, 0.002, 0.0, 0.5])
+    part = impulse[:, 0] / FORCE
+    # 12.5 ms, then at least 7.5 ms, then nothing, then no more than the period; 0.6 % per step.
+    expected = [0.005, 0.005, 0.0025, 0.0, 0.005, 0.0025, *[0.0] * 6, *[0.005] * 4]
+    np.testing.assert_allclose(part, expected, rtol=4e-3)
+    assert cut[:, 0].tolist() == [0.0] * 4 + [1.0] * 4 + [0.0] * 4 + [1.0] * 4
+    with pytest.raises(ValueError, match=r"plant\.cold_gas\.minimum_on: 0\.03 s is longer than"):
+        thrusters(minimum_on=0.03)
+
+
+def test_valves_share_one_tank_and_a_batch_is_its_vehicles() -> None:
+    flown = thrusters(3, exponent=1.4)
+    random = np.random.default_rng(2)
+    every, alone = flown.reset(4), [flown.reset(1) for _ in range(4)]
+    for _ in range(8):
+        on_time = random.uniform(-0.01, 0.025, (4, 3))
+        for _ in range(4):
+            every, mean, _ = flown.act(every, PulseCommand(on_time), TRUTH, STEP)
+            for i in range(4):
+                one = PulseCommand(on_time[i : i + 1])
+                alone[i], mean_one, _ = flown.act(alone[i], one, TRUTH, STEP)
+                np.testing.assert_array_equal(mean[i], mean_one[0])
+    for name, values in every.items():
+        np.testing.assert_array_equal(values, np.concatenate([one[name] for one in alone]))
+    # Three valves together empty the tank as one does that is open three times as long.
+    together, _, _ = fire(flown, [[0.02, 0.02, 0.02]] * 2)
+    one_by_one, _, _ = fire(flown, [[0.02, 0.0, 0.0]] * 6)
+    np.testing.assert_allclose(together["cold_gas"], one_by_one["cold_gas"], rtol=1e-14)
+
+
+def test_what_a_stuck_valve_spends_leaves_the_tank() -> None:
+    flown = thrusters(2)
+    state, applied = flown.reset(1), np.zeros((1, 2))
+    stuck = np.array([[0.0, 0.5]])
+    after, thrust = flown.account_propellant(state, applied, stuck, STEP)
+    np.testing.assert_array_equal(thrust, stuck)
+    assert GAS - after["cold_gas"][0, 0] == pytest.approx(0.5 * STEP / SPEED, rel=1e-9)
+    empty = {"cold_gas": np.zeros((1, 1)), "cold_gas_step": np.zeros((1, 1))}
+    after, thrust = flown.account_propellant(empty, applied, stuck, STEP)
+    assert not thrust.any()
+
+
+def test_a_satellite_is_turned_by_gas_and_its_log_is_flown_again(tmp_path: Path) -> None:
+    folder = Path(str(resources.files("mjspace.scenarios")))
+    table = load("rcs-three-axis", ["duration=2", "checks=[]"])[0].model_dump(exclude_none=True)
+    rcs = table["plant"].pop("rcs")
+    layout = {key: rcs[key] for key in ("positions", "directions", "thrust")}
+    table["plant"]["cold_gas"] = {**layout, "specific_impulse": ISP, "gas": GAS, "exponent": 1.4}
+    built = assemble(validate(table, "cold gas"), folder)
+    flown = fly_to_log(built, tmp_path / "flight.mcap")
+    truth, command = flown.log.read("/truth"), flown.log.read("/command")
+    assert np.linalg.norm(truth["rate"][-1]) > 3e-4  # it turns
+    used = truth["propellant"][0, 0] - truth["propellant"][-1, 0]
+    assert 1e-6 < used < 0.1 * GAS
+    assert command["thruster_thrust"].max() <= rcs["thrust"]
+    assert flown.log.units["/command"]["thruster_thrust"] == "N"
+    assert verify(flown.path) is None
+    table["plant"]["rcs"] = rcs
+    with pytest.raises(InputError, match="cold_gas and rcs are both given: give one"):
+        validate(table, "both")
+
+
+def test_an_unphysical_polytrope_is_refused_in_one_line() -> None:
+    table = load("rcs-three-axis")[0].model_dump(exclude_none=True)
+    rcs = table["plant"].pop("rcs")
+    layout = {key: rcs[key] for key in ("positions", "directions", "thrust")}
+    table["plant"]["cold_gas"] = {**layout, "exponent": 0.9}
+    with pytest.raises(InputError, match=r"plant\.cold_gas\.exponent: got 0\.9, should be greater"):
+        validate(table, "file.toml")
