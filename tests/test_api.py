@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 import mjspace
+from mjspace.errors import NoRendererError
 
 SHORT = ("duration=0.05", "checks=[]")
 ROOMS = [path.stem for path in Path(mjspace.__file__).parent.iterdir()]
@@ -84,8 +85,14 @@ def test_pictures_are_made_of_a_path_or_a_log(flown: Path, tmp_path: Path) -> No
         assert size_of(tmp_path / "page.png")[0] == 1375
         panels = [axes.get_title(loc="left") for axes in mjspace.figure(log).axes]
         assert "Body rate [deg/s]" in panels
-        mjspace.render(log, tmp_path / "still.png", size=(64, 48))
-        assert size_of(tmp_path / "still.png") == (64, 48)
+
+
+def test_a_still_is_rendered(flown: Path, tmp_path: Path) -> None:
+    try:
+        mjspace.render(mjspace.Log(flown), tmp_path / "still.png", size=(64, 48))
+    except NoRendererError as error:
+        pytest.skip(str(error))
+    assert size_of(tmp_path / "still.png") == (64, 48)
 
 
 def test_bad_input_is_one_line_that_names_it(flown: Path, tmp_path: Path) -> None:
