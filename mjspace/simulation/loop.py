@@ -21,6 +21,7 @@ from mjspace.simulation.initial_state import Start, last_period
 from mjspace.simulation.recording import Block, Recording, until_trouble
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_code import (
+    check_inner,
     check_same_shapes,
     check_state,
     check_step,
@@ -243,10 +244,12 @@ class _Flight:
         """Let the motors act on the command; return their torques, and which of them are cut."""
         if self.inner is not None:
             try:
-                self.law_state, command = self.inner(self.law_state, now, command, measurement)
+                returned = self.inner(self.law_state, now, command, measurement)
             except Exception as error:
                 raise failure("the law's inner loop", error) from error
-            read_only(self.law_state)
+            check_inner(returned)
+            state, command = returned
+            self.law_state = read_only(state or ())
         before = self.actuator_state
         after, given, saturated = self.actuators.act(before, command, truth, self.hold)
         self.actuator_state = after

@@ -47,7 +47,8 @@ def failure(who: str, error: Exception) -> FlightError:
     """Return the error that says what ``who``, code of the user's, raised, and in which line."""
     place = _place(error)
     hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
-    return FlightError(f"{who} raised {type(error).__name__} at {place}: {error}{hint}")
+    message = " ".join(str(error).split())
+    return FlightError(f"{who} raised {type(error).__name__} at {place}: {message}{hint}")
 
 
 def reference_at(source: ReferenceSource, time: Array) -> DesiredMotion:
@@ -108,6 +109,20 @@ def check_step(returned: Any) -> None:
                 f"the law's step returned {_described(returned)}: the {name} must be a named tuple "
                 "of arrays, or None"
             )
+
+
+def check_inner(returned: Any) -> None:
+    """Refuse what a law's ``inner`` must not return.
+
+    Raises:
+        FlightError: anything but (state, command), with what it is instead.
+    """
+    right = type(returned) is tuple and len(returned) == 2
+    if not (right and _is_optional(returned[0]) and _is_named(returned[1])):
+        raise FlightError(
+            f"the law's inner loop returned {_described(returned)}: it must return (state, "
+            "command), each a named tuple of arrays; state may be None"
+        )
 
 
 def check_vehicle_axis(name: str, arrays: Any, vehicles: int) -> None:
