@@ -50,7 +50,8 @@ def failure(who: str, error: Exception) -> FlightError:
     """
     place = _place(error)
     hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
-    return FlightError(f"{who} raised {type(error).__name__} at {place}: {error}{hint}")
+    message = " ".join(str(error).split())
+    return FlightError(f"{who} raised {type(error).__name__} at {place}: {message}{hint}")
 
 
 def reference_at(source: ReferenceSource, time: Array) -> DesiredMotion:
