@@ -190,6 +190,7 @@ class _Page(HTMLParser):
                 self.ids.add(value)
             elif name in ("href", "src") and value:
                 self.targets.add(value)
+                assert tag == "a" or not value.startswith("http"), value  # nothing is loaded
 
 
 @pytest.mark.slow

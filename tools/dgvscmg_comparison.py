@@ -49,7 +49,7 @@ with 1.17 N m s in its wheel, the reaction wheels at rest.
 - **Supply** is what is taken where no motor regenerates: for each motor the positive part of
   mechanical power and copper loss together.
 
-Bearing friction and drive electronics are in none of them. To write this page again:
+Bearing friction and drive electronics are not modelled. To write this page again:
 
     mjspace run dgvscmg-tracking --out runs/cmg
     mjspace run dgvscmg-tracking --set "plant.ripple={{}}" --out runs/quiet
