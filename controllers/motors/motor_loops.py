@@ -234,7 +234,8 @@ def refuse_fast_poles(kep: Gain, kei: Gain, decay: Gain, period: float) -> None:
         raise ValueError(
             f"current gains {p:g} 1/s and {i:g} 1/s^2 put a pole at {fastest:.2g} rad/s: a control "
             f"period of {period:g} s is too long, it should be at most {2.0 / fastest:.1e} s (and "
-            f"the steps of RK4 at most {_RK4 / fastest:.1e} s); or use a gain of {0.3 / period:g} 1/s"
+            f"the steps of RK4 at most {_RK4 / fastest:.1e} s); or use a "
+            f"gain of {0.3 / period:g} 1/s"
         )
 
 
