@@ -44,15 +44,15 @@ def main() -> None:
 @app.command("list")
 def list_scenarios(as_json: Json = False) -> None:
     """List the scenarios that come with mjspace."""
-    from mjspace.scenario.loading import load, scenario_names
+    from mjspace.scenario.loading import description, scenario_names
 
-    found = {name: load(name)[0].description for name in scenario_names()}
+    found = {name: description(name) for name in scenario_names()}
     if as_json:
         print(json.dumps(found, indent=2))
         return
     width = max(map(len, found))
-    for name, description in found.items():
-        print(f"{name:{width}}  {description}")
+    for name, text in found.items():
+        print(f"{name:{width}}  {text}")
 
 
 @app.command()

@@ -25,6 +25,12 @@ def scenario_names() -> list[str]:
     return sorted(p.name[:-5] for p in folder.iterdir() if p.name.endswith(".toml"))
 
 
+def description(name: str) -> str:
+    """Return the description of a scenario that comes with mjspace, without validating it."""
+    text: str = _read(_find(name), ())["description"]
+    return text
+
+
 def load(scenario: str | Path, overrides: Iterable[str] = ()) -> tuple[Scenario, Path]:
     """Return the scenario of that name or path, and the folder its own files are beside.
 
