@@ -1,7 +1,8 @@
 """mjspace: a spacecraft testbed on MuJoCo physics.
 
-``mjspace.run(scenario)`` flies one, ``mjspace.load(scenario)`` only reads it, ``mjspace.replay(log,
-out)`` flies a log again, ``mjspace.Log(path)`` reads one.
+The command line's words from Python: ``list_scenarios()``, ``load(scenario)``, ``run(scenario)``,
+``replay(log, out)``, ``verify(log)``, ``plot(log, file)``, ``figure(log)``, ``render(log, file)``.
+``Log(path)`` reads a log as NumPy arrays. Where a log is an argument, its path or a ``Log`` may be.
 """
 
 from importlib import import_module
@@ -9,19 +10,42 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-_PLACES = {
-    "load": "mjspace.scenario.loading",
-    "run": "mjspace.runner.run",
-    "replay": "mjspace.runner.replay",
-    "verify": "mjspace.runner.replay",
+# None of these names is one of a module or a package of mjspace: importing that would replace it.
+_MODULES = {
     "Log": "mjspace.log.reader",
+    "figure": "mjspace.plotting.page",
+    "list_scenarios": "mjspace.scenario.loading",
+    "load": "mjspace.scenario.loading",
+    "plot": "mjspace.plotting.page",
+    "render": "mjspace.rendering.render",
+    "replay": "mjspace.runner.replay",
+    "run": "mjspace.runner.run",
+    "verify": "mjspace.runner.replay",
 }
 
-__all__ = ["Log", "load", "replay", "run", "verify"]
+__all__ = [
+    "Log",
+    "figure",
+    "list_scenarios",
+    "load",
+    "plot",
+    "render",
+    "replay",
+    "run",
+    "verify",
+]
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for: a control law that imports mjspace.attitude needs no simulator."""
-    if name in _PLACES:
-        return getattr(import_module(_PLACES[name]), name)
+    """Import a name of the API when it is first used.
+
+    A control law that imports mjspace.attitude thus needs neither MuJoCo nor a log.
+    """
+    if name in _MODULES:
+        return getattr(import_module(_MODULES[name]), name)
     raise AttributeError(f"module 'mjspace' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Return the names of the module, with those that are imported when first used."""
+    return sorted({*globals(), *__all__})

@@ -1,6 +1,8 @@
 """Units: conversion of ``"0.1 deg"`` to SI, the unit beside a field, and the unit on a plot."""
 
 import math
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_type_hints
 
@@ -64,6 +66,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "V s/rad": ("N m/A", 1.0),
 }
 
+_SYMBOLS = {s for name in UNITS for s in re.split(r"[ /]", re.sub(r"\^\d+", "", name))} | {"1", "W"}
 _DISPLAYED_IN = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
 
 
@@ -144,14 +147,31 @@ def any_to_si(value: str) -> float:
     return magnitude * UNITS[written][1]
 
 
-def quantity_in(value: Any) -> str | None:
-    """Return the first string in nested lists that is a number with a known unit; None if none."""
-    if isinstance(value, list | tuple):
-        return next((found for item in value if (found := quantity_in(item))), None)
+def quantity_in(value: Any, place: str = "") -> tuple[str, str] | None:
+    """Return the first text in nested lists and tables that is a number with a unit.
+
+    The unit need not be in ``UNITS``: a product of powers of its symbols is enough, as ``N m/rad``.
+
+    Returns:
+        Where in ``value`` it is, as ``[0].after`` (empty for ``value`` itself), and the text; None
+        if there is none.
+    """
+    if isinstance(value, Mapping):
+        items = {f"{place}.{key}": item for key, item in value.items()}
+    elif isinstance(value, list | tuple):
+        items = {f"{place}[{index}]": item for index, item in enumerate(value)}
+    else:
+        return (place, value) if isinstance(value, str) and _is_quantity(value) else None
+    return next((found for at, item in items.items() if (found := quantity_in(item, at))), None)
+
+
+def _is_quantity(value: str) -> bool:
     try:
-        return value if isinstance(value, str) and _split(value)[1] in UNITS else None
+        unit = _split(value)[1]
     except ValueError:
-        return None
+        return False
+    symbols = re.split(r"[ /]", re.sub(r"\^-?\d+", "", unit))
+    return bool(unit) and _SYMBOLS.issuperset(symbols)
 
 
 def whole_number(span: float, unit: float, span_key: str, unit_key: str) -> int:

@@ -89,12 +89,11 @@ def replay(
     """Fly a log again: to prove it, or under another law."""
     from mjspace.runner import replay as again
     from mjspace.runner.run import output_folder
-    from mjspace.scenario.loading import component
 
     if gains and not law:
-        raise InputError("--gain: goes with --law")
+        raise InputError("--gain: is for another law: name it by --law")
     if verify and law:
-        raise InputError("--verify: another law flies another flight: leave --law out")
+        raise InputError("--verify: compares the flight under the logged law: leave --law out")
     logged = open_log(log)
     with cause_shown(traceback), progress_bar(logged.end, "flying") as progress:
         if verify:
@@ -104,7 +103,8 @@ def replay(
                 log,
                 output_folder(out, f"{logged.metadata.get('scenario', log.stem)}-replay"),
                 start=start,
-                law=component(law, gains) if law else None,
+                law=law or None,
+                gains=gains,
                 progress=progress,
             )
     if not verify:

@@ -52,6 +52,16 @@ class Log:
                 units = {name: channel.metadata.get(f"unit.{name}", "") for name in names}
                 self.units[topic] = {name: unit for name, unit in units.items() if unit}
 
+    @classmethod
+    def of(cls, log: "Log | Path | str") -> "Log":
+        """Return ``log`` itself, or the log at that path.
+
+        Raises:
+            OSError: the file cannot be read.
+            ValueError: it is not an MCAP file, or not a log of mjspace.
+        """
+        return log if isinstance(log, Log) else cls(log)
+
     @property
     def attachments(self) -> tuple[str, ...]:
         """Names of the attachments."""

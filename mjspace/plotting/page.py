@@ -22,25 +22,32 @@ from mjspace.scenario.scenario import Scenario
 WIDTH, LEFT, RIGHT, PANEL, BETWEEN, HEAD, FOOT = 12.5, 0.7, 0.25, 1.75, 0.5, 1.05, 0.85
 
 
-def plot(log_path: Path | str, output: Path | str, *, signals: Sequence[str] = ()) -> None:
-    """Write a page of plots as PNG: the standard one, or one panel for each of ``signals``.
+def plot(log: Log | Path | str, output: Path | str, *, signals: Sequence[str] = ()) -> None:
+    """Write a log's page of plots as PNG: the standard one, or one panel for each of ``signals``.
 
-    Signals are named as in a scenario's checks (``truth.rate[0]``). The log is never loaded whole:
-    a line has at most some 4000 points, the extremes among them.
+    Signals are named as in a scenario's checks (``truth.rate[0]``); values are in the log's SI
+    units, angles in degrees and wheel speeds in rpm. The log is never loaded whole: a line has at
+    most some 4000 points, the extremes among them.
 
     Raises:
-        ValueError: ``output`` does not end in .png, no such signal, or no log of mjspace.
+        ValueError: ``output`` does not end in .png, no such signal, or not a log of mjspace.
         OSError: a file cannot be read or written.
     """
     output = Path(output)
     if output.suffix != ".png":
         raise ValueError(f"output {str(output)!r}: end it in .png")
     with matplotlib.rc_context(STYLE):
-        figure(Log(log_path), signals).savefig(output, dpi=110, facecolor="white")
+        figure(log, signals).savefig(output, dpi=110, facecolor="white")
 
 
-def figure(log: Log, signals: Sequence[str] = ()) -> Figure:
-    """Return the page, as ``plot`` writes it but for the style."""
+def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:
+    """Return the page as a matplotlib figure, as ``plot`` writes it but for the style.
+
+    Raises:
+        ValueError: no such signal, or not a log of mjspace.
+        OSError: the log cannot be read.
+    """
+    log = Log.of(log)
     scenario = scenario_of(log)
     found = list(chosen(log, signals) if signals else curves(log))
     warnings = [e.time for e in log.events() if e.level in ("WARNING", "ERROR", "FATAL")]

@@ -22,7 +22,7 @@ GROUPS = 6
 _ARROWS = (0.12, 0.37, 0.62, 0.87)  # of the way
 
 
-def plot(log_path: Path | str, output: Path | str, x: str, y: str) -> None:
+def plot(log: Log | Path | str, output: Path | str, x: str, y: str) -> None:
     """Write the phase plane of the signals ``x`` and ``y`` as PNG.
 
     Raises:
@@ -33,7 +33,7 @@ def plot(log_path: Path | str, output: Path | str, x: str, y: str) -> None:
     if output.suffix != ".png":
         raise ValueError(f"output {str(output)!r}: end it in .png")
     with matplotlib.rc_context(STYLE):
-        figure(Log(log_path), x, y).savefig(output, dpi=130, facecolor="white")
+        figure(Log.of(log), x, y).savefig(output, dpi=130, facecolor="white")
 
 
 def figure(log: Log, x: str, y: str) -> Figure:

@@ -19,7 +19,7 @@ from mjspace.vehicle.vehicle import from_bytes
 
 
 def render(
-    log_path: Path | str,
+    log: Log | Path | str,
     output: Path | str,
     *,
     camera: str = "chase",
@@ -41,7 +41,7 @@ def render(
         NoRendererError: this machine cannot draw, with what to install.
         OSError: a file cannot be read or written.
     """
-    log, output = Log(log_path), Path(output)
+    log, output = Log.of(log), Path(output)
     if output.suffix not in (".mp4", ".png"):
         raise ValueError(f"output {str(output)!r}: end it in .mp4 for a video, .png for a still")
     if min(size) < 16 or min(rate, speed) <= 0.0:

@@ -1,9 +1,9 @@
-"""Flying again from a log alone: to prove it bit for bit, or to see what another law would do."""
+"""Flying again from a log alone: to verify it bit for bit, or under another law."""
 
 import dataclasses
 import math
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,7 @@ from mjspace.errors import InputError, input_error_at
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.runner.run import Progress, Result, fly_to_log
+from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start
@@ -47,28 +48,35 @@ class Difference:
 
 
 def replay(
-    log_path: str | Path,
+    log: Log | str | Path,
     out: str | Path,
     *,
     start: float = 0.0,
-    law: Component | None = None,
+    law: Component | str | None = None,
+    gains: Iterable[str] = (),
     folder: Path = Path(),
     progress: Progress = lambda time: None,
 ) -> Result:
     """Fly a log again from time ``start`` [s] into a new log, ``flight.mcap`` in ``out``.
 
-    Under another ``law``, whose files are looked up from ``folder``, its state begins at ``start``,
-    and the checks and events of the logged law's signals are left out.
+    ``law`` is another law, ``"module:Class"`` or ``"file.py:Class"``, with ``gains`` as
+    ``"key=value"``; its files are looked up from ``folder``. Its state begins at ``start``, and the
+    checks and events of the logged law's signals are left out.
 
     Raises:
-        InputError: no such log, time or law.
+        InputError: no such log, time, law or gain; ``out`` holds the log itself.
+        FlightError: the flight could not even begin.
         OSError: the new log cannot be written.
     """
     with input_error_at("log"):
-        log = Log(log_path)
+        log = Log.of(log)
     path = Path(out) / "flight.mcap"
-    if path.exists() and path.samefile(log_path):
-        raise InputError(f"--out {out}: holds the very log that is to be flown again")
+    if path.exists() and path.samefile(log.path):
+        raise InputError(f"--out {out}: holds the log that is to be flown again")
+    if isinstance(law, str):
+        law = component(law, gains)
+    elif gains:
+        raise InputError("gains: are for another law: name it by law")
     with assembly_of(log, law, folder) as assembly:
         begin = start_of(log, assembly, start, fresh_law=law is not None)
         member = int(log.metadata["member"])
@@ -76,18 +84,18 @@ def replay(
 
 
 def verify(
-    log_path: str | Path, *, start: float = 0.0, progress: Progress = lambda time: None
+    log: Log | str | Path, *, start: float = 0.0, progress: Progress = lambda time: None
 ) -> Difference | None:
-    """Fly a log again from ``start`` [s]; return where it first differs, None if nowhere.
+    """Fly a log again from time ``start`` [s]; return the first difference, None if there is none.
 
     Every field of every topic is compared bit for bit, those of ``/state`` first.
 
     Raises:
-        InputError: no such log or time, or rows that the log's own digests do not know.
-        FlightError: the repeated flight cannot go on where the logged one could.
+        InputError: no such log or time, or rows that differ from the log's own digests.
+        FlightError: the repeated flight cannot go on where the logged one did.
     """
     with input_error_at("log"):
-        log = Log(log_path)
+        log = Log.of(log)
         altered = log.altered()
     if altered:
         raise InputError(

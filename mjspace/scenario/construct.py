@@ -77,7 +77,7 @@ def construct(
     for name, value in values.items():
         if "unit" in declared.get(name, {}):
             values[name] = _in_si(name, value, declared[name])
-        elif name not in inside:
+        else:
             _refuse_unlike(name, value, parameters[name].annotation, component.kind)
     refuse_unfit(values, declared)
     built = kind(**values)
@@ -153,14 +153,18 @@ def _in_si(name: str, value: Any, declared: Mapping[str, Any]) -> Any:
 
 
 def _refuse_unlike(name: str, value: Any, annotation: Any, kind: str) -> None:
-    """Refuse a value that is not of the type that an undeclared gain is annotated with."""
-    written = quantity_in(value)
-    if written is not None and annotation is not str:
-        unit = written.partition(" ")[2]
-        raise ValueError(
-            f"{name}: got {written!r}, but {kind} declares no unit for it: write a number in SI, "
-            f"or declare {name}: float = gain({unit!r}) in the law (mjspace.contract.gain)"
-        )
+    """Refuse a value that does not fit the annotation of a gain without a declared unit."""
+    quantity = None if _takes_text(annotation) else quantity_in(value)
+    if quantity is not None:
+        place, text = quantity
+        unit = text.strip().partition(" ")[2]
+        cure = "write a number in SI"
+        if not place:
+            cure += (
+                f", or declare {name}: float = gain({unit!r}) in {kind}, a dataclass "
+                "(mjspace.contract.gain)"
+            )
+        raise ValueError(f"{name}{place}: got {text!r}, but {kind} declares no unit for it: {cure}")
     if get_origin(annotation) is Literal:
         if value not in get_args(annotation):
             have = ", ".join(map(repr, get_args(annotation)))
@@ -173,6 +177,16 @@ def _refuse_unlike(name: str, value: Any, annotation: Any, kind: str) -> None:
     right = isinstance(value, kinds) and (annotation is bool or not isinstance(value, bool))
     if not right or value != value:  # nan is no number
         raise ValueError(f"{name}: got {value!r}, should be {word[annotation]}")
+
+
+def _takes_text(annotation: Any) -> bool:
+    """Return whether a parameter with that annotation may be text, or hold text."""
+    if annotation in (str, "str") or get_origin(annotation) is Literal:
+        return True
+    inside = get_args(annotation)
+    if issubclass(get_origin(annotation) or object, Mapping):
+        inside = inside[1:]
+    return any(map(_takes_text, inside))
 
 
 @functools.cache

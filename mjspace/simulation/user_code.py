@@ -50,7 +50,8 @@ def failure(who: str, error: Exception) -> FlightError:
     """
     place = _place(error)
     hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
-    return FlightError(f"{who} raised {type(error).__name__} at {place}: {error}{hint}")
+    message = " ".join(str(error).split())
+    return FlightError(f"{who} raised {type(error).__name__} at {place}: {message}{hint}")
 
 
 def reference_at(source: ReferenceSource, time: Array) -> DesiredMotion:
@@ -114,16 +115,16 @@ def check_step(returned: Any) -> None:
 
 
 def check_inner(returned: Any) -> None:
-    """Refuse what a law's inner loop must not return.
+    """Refuse what a law's ``inner`` must not return.
 
     Raises:
-        FlightError: anything but (state, command), with what was returned.
+        FlightError: anything but (state, command), with what it is instead.
     """
-    good = type(returned) is tuple and len(returned) == 2
-    if not (good and _is_optional(returned[0]) and _is_named(returned[1])):
+    right = type(returned) is tuple and len(returned) == 2
+    if not (right and _is_optional(returned[0]) and _is_named(returned[1])):
         raise FlightError(
             f"the law's inner loop returned {_described(returned)}: it must return (state, "
-            "command), named tuples of arrays; state may be None"
+            "command), each a named tuple of arrays; state may be None"
         )
 
 

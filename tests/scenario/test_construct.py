@@ -80,20 +80,101 @@ def test_what_is_wrong_is_said(kind: str, gains: dict[str, object], message: str
         build(kind, **gains)
 
 
-def test_a_quantity_for_a_gain_without_a_unit_is_refused_with_the_cure(tmp_path: Path) -> None:
-    (tmp_path / "damper.py").write_text(DAMPER)
+UNDECLARED = """
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+class Plain:
+    def __init__(self, damping=1.0, mode="fast", table=None, law=None):
+        self.damping, self.mode, self.table, self.law = damping, mode, table, law
+    def at(self, time):
+        pass
+
+@dataclass
+class Annotated:
+    damping: float = 2.0
+    weights: list[float] = field(default_factory=list)
+    table: dict[str, float] = field(default_factory=dict)
+    anything: Any = None
+    note: str = ""
+    notes: list[str] = field(default_factory=list)
+    label: str | None = None
+    mode: Literal["2 s", "fast"] = "fast"
+"""
+HOLD = {"kind": "references:Hold"}
+DECLARE = r"write a number in SI, or declare damping: float = gain\('N m s/rad'\) in own.py:\w+, a"
+
+
+@pytest.mark.parametrize(
+    ("kind", "gains", "message"),
+    [
+        ("Plain", {"damping": "30 N m s/rad"}, "damping: got '30 N m s/rad', but .*" + DECLARE),
+        ("Annotated", {"damping": "30 N m s/rad"}, "damping: got '30 N m s/rad', but .*" + DECLARE),
+        ("Plain", {"damping": "0.5 1/s"}, r"damping: got '0\.5 1/s', .* gain\('1/s'\)"),
+        ("Plain", {"damping": " 3  rad/s^3 "}, r"damping: got .* declares no unit for it"),
+        ("Plain", {"damping": ["3 deg", 1.0]}, r"damping\[0\]: got '3 deg', .* number in SI$"),
+        ("Plain", {"table": {"a": [1.0, {"b": "2 s"}]}}, r"table\.a\[1\]\.b: got '2 s', .* in SI$"),
+        ("Plain", {"law": HOLD, "table": {"a": "2 s"}}, r"table\.a: got '2 s'"),
+        ("Plain", {"table": [HOLD, {"a": "2 s"}]}, r"table\[1\]\.a: got '2 s'"),
+        ("Annotated", {"weights": [1.0, "3 deg"]}, r"weights\[1\]: got '3 deg'"),
+        ("Annotated", {"table": {"a": "3 deg"}}, r"table\.a: got '3 deg'"),
+        ("Annotated", {"anything": "3 deg"}, "anything: got '3 deg'"),
+        ("Annotated", {"damping": "7"}, "damping: got '7', should be a number"),
+        ("Annotated", {"damping": True}, "damping: got True, should be a number"),
+        ("Annotated", {"damping": float("nan")}, "damping: got nan, should be a number"),
+        ("Annotated", {"mode": "3 s"}, "mode: got '3 s', should be one of '2 s', 'fast'"),
+    ],
+)
+def test_a_quantity_without_a_declared_unit_is_refused_with_the_cure(
+    tmp_path: Path, kind: str, gains: dict[str, Any], message: str
+) -> None:
+    (tmp_path / "own.py").write_text(UNDECLARED)
+    with pytest.raises(ValueError, match=message):
+        build(f"own.py:{kind}", tmp_path, **gains)
+
+
+def test_text_that_is_not_a_quantity_or_is_annotated_as_text_is_passed_on(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(UNDECLARED)
+    plain, _ = build("own.py:Plain", tmp_path, mode="2 wheels", table={"a": ["slow", "inf"]})
+    assert (plain.mode, plain.table) == ("2 wheels", {"a": ["slow", "inf"]})
+    texts = {"note": "2 s", "notes": ["3 m"], "label": "4 N", "mode": "2 s"}
+    annotated, flown = build("own.py:Annotated", tmp_path, **texts)
+    assert {name: getattr(annotated, name) for name in texts} == texts
+    assert {name: flown.gains[name] for name in texts} == texts
+
+
+DECLARED = """
+from dataclasses import dataclass
+import numpy as np
+from mjspace.contract import gain
+
+@dataclass
+class Source:
+    turn: float = gain("rad/s", default=0.1)
+    axes: np.ndarray = gain("m", (2, 2), default=((1.0, 0.0), (0.0, 1.0)))
+    stiffness: float = gain("N m/rad", default=1.0)
+    share: float = gain(default=0.5)
+"""
+
+
+def test_a_declared_unit_is_converted_wherever_the_gain_is(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(DECLARED)
+    gains = {"turn": "6 rpm", "axes": [["1 km", 2.0], ["3 mm", "4 m"]], "stiffness": "5 N m/rad"}
+    source, flown = build("own.py:Source", tmp_path, **gains)
+    assert source.turn == pytest.approx(0.2 * np.pi, rel=1e-15)
+    np.testing.assert_array_equal(source.axes, [[1000.0, 2.0], [0.003, 4.0]])
+    assert source.stiffness == 5.0
+    again, _ = build("own.py:Source", tmp_path, **flown.gains)  # as a log has it: SI numbers
+    assert (again.turn, again.stiffness) == (source.turn, source.stiffness)
     for bad, message in (
-        (
-            "30 N m s/rad",
-            r"gain: got '30 N m s/rad', but .* declares no unit .* gain\('N m s/rad'\)",
-        ),
-        ("7", r"gain: got '7', should be a number"),
-        (True, r"gain: got True, should be a number"),
-        (float("nan"), r"gain: got nan, should be a number"),
-        (["3 deg", 1.0], r"gain: got '3 deg', but"),
+        ({"turn": "3 deg"}, "turn: '3 deg' has the unit 'deg', should be one of rad/s, deg/s"),
+        ({"axes": [["1 s", 2.0], [3.0, 4.0]]}, "axes: '1 s' has the unit 's'"),
+        ({"stiffness": "5 N m"}, "stiffness: '5 N m' has the unit 'N m', should be N m/rad"),
+        ({"share": "5 deg"}, "share: got the text '5 deg', should be a plain number"),
+        ({"turn": {"a": "3 deg"}}, "turn: got {'a': '3 deg'}, should be a number"),
     ):
         with pytest.raises(ValueError, match=message):
-            build("damper.py:Damper", tmp_path, gain=bad)
+            build("own.py:Source", tmp_path, **bad)
 
 
 def test_a_law_of_ones_own_is_flown_one_by_one(tmp_path: Path) -> None:

@@ -1,6 +1,8 @@
 """Users' code can change nothing that it receives; what it returns and raises is named as that."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -224,6 +226,99 @@ def test_a_copy_may_be_changed_and_the_truth_stays(tmp_path: Path) -> None:
 def test_a_wrong_return_is_named(tmp_path: Path, step: str, message: str) -> None:
     with pytest.raises(FlightError, match=message):
         flown(tmp_path, law(step))
+
+
+LINE = HEAD.count("\n") + 3
+"""Of the first line of a law's ``step``, in own.py."""
+
+
+@pytest.mark.parametrize("batched", ["true", "false"])
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        ("return 1 / 0", "ZeroDivisionError at own.py:{line}: division by zero"),
+        ("x = 1; return np.linalg.inv(np.zeros((3, 3)))", "LinAlgError at own.py:{line}: Singular"),
+        ("return {}['gain']", "KeyError at own.py:{line}: 'gain'"),
+        ("raise ValueError('one\\n  two')", "ValueError at own.py:{line}: one two"),
+    ],
+)
+def test_what_a_law_raises_has_its_file_and_line(
+    tmp_path: Path, step: str, message: str, batched: str
+) -> None:
+    with pytest.raises(FlightError) as raised:
+        flown(tmp_path, law(step), f"law.batched={batched}")
+    assert f"t = 0 s: the law raised {message.format(line=LINE)}" in str(raised.value)
+    with pytest.raises(FlightError) as raised:
+        flown(tmp_path, law(GOOD, step), f"law.batched={batched}")
+    assert f"t = 0 s: the law raised {message.format(line=LINE + 2)}" in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("inner", "message"),
+    [
+        ("None", r"the law's inner loop returned None: it must return \(state, command\)"),
+        ("(1.0, c)", r"returned \(a float, a TorqueCommand\): it must"),
+        ("(s, [c.torque])", r"returned \(\(\), a list\): it must"),
+        ("(s, c, None)", r"returned \(\(\), a TorqueCommand, None\): it must"),
+        ("c / 2", r"the law's inner loop raised TypeError at own\.py:\d+"),
+    ],
+)
+def test_a_wrong_return_of_an_inner_loop_is_named(tmp_path: Path, inner: str, message: str) -> None:
+    code = law(GOOD) + f"\nLaw.inner = lambda self, s, t, c, m: {inner}\n"
+    with pytest.raises(FlightError, match=message):
+        flown(tmp_path, code, "law.batched=true", "rates.physics='5 ms'")
+
+
+def test_an_inner_loop_without_memory_may_return_none(tmp_path: Path) -> None:
+    code = law(GOOD) + "\nLaw.inner = lambda self, s, t, c, m: (None, c)\n"
+    assert flown(tmp_path, code, "law.batched=true", "rates.physics='5 ms'")
+
+
+class Broken:
+    """Actuators with a fault in their own code."""
+
+    def __init__(self, actuators: Any) -> None:
+        self._actuators = actuators
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._actuators, name)
+
+    def act(self, *_: Any) -> Any:
+        raise KeyError("limit")
+
+
+@pytest.mark.parametrize("inner", ["", "\nLaw.inner = lambda self, s, t, c, m: (s, c)\n"])
+def test_an_error_inside_an_actuator_is_not_the_laws(tmp_path: Path, inner: str) -> None:
+    """It is a fault of mjspace, and stays the exception that it is, with its traceback."""
+    path = scenario(tmp_path, law(GOOD) + inner)
+    built = assemble(*load(path, ["law.batched=true", "rates.physics='5 ms'"]))
+    broken: Any = Broken(built.actuators)
+    with pytest.raises(KeyError, match="limit"):
+        list(fly(replace(built, actuators=broken), first_start(built, [0])))
+
+
+def test_a_law_may_declare_units(tmp_path: Path) -> None:
+    code = (
+        law(GOOD, "return Memory(np.zeros(1))")
+        + """
+from typing import Annotated
+from mjspace.contract import Array, Unit
+class Seen(NamedTuple):
+    e: Annotated[Array, Unit("rad/s")]
+class Memory(NamedTuple):
+    slip: Annotated[np.ndarray, Unit("m")]
+class Push(NamedTuple):
+    torque: np.ndarray
+    heat: Annotated[np.ndarray, Unit("W")]
+Law.step = lambda self, s, t, m, r: (s, Push(0.0 * m.rate, np.zeros(1)), Seen(m.rate))
+"""
+    )
+    log = run(scenario(tmp_path, code), out=tmp_path / "out").log
+    assert log.units["/law"] == {"e": "rad/s"}
+    assert log.units["/state"] == {"law_slip": "m"}
+    assert log.units["/command"] == {"torque": "N m", "heat": "W"} | {
+        name: "N m" for name in log.topics["/command"] if name.endswith("_torque")
+    }
 
 
 def test_periods_before_a_change_of_shape_are_kept(tmp_path: Path) -> None:
