@@ -26,7 +26,7 @@ def scenario_names() -> list[str]:
 
 
 def list_scenarios() -> dict[str, str]:
-    """Return the description of each scenario that comes with mjspace, by name; none is validated."""
+    """Return the description of each scenario that comes with mjspace, by name, unvalidated."""
     return {name: _read(_find(name), ())["description"] for name in scenario_names()}
 
 
