@@ -1,7 +1,8 @@
-"""What every law must do: change nothing it is given, and fly one vehicle or many, either sign."""
+"""Attitude laws over many samples: alone or in a batch, any leading axes, either sign, bad input.
 
-import subprocess
-import sys
+What every law must satisfy is in test_every_law.py.
+"""
+
 from typing import Any
 
 import numpy as np
@@ -56,32 +57,6 @@ def wanted(rows: int) -> list[Reference]:
     return [Reference(*(part[k] for part in parts)) for k in range(rows)]
 
 
-def copied(arrays: Any) -> Any:
-    return type(arrays)(*(array.copy() for array in arrays))
-
-
-def same(one: Any, other: Any) -> bool:
-    return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
-
-
-@laws
-def test_a_step_is_a_pure_function(law: Any) -> None:
-    (seen, later), (reference, next_) = readings(3, 2), wanted(2)
-    state = law.reset(seen, reference)
-    state, *_ = law.step(state, 0.0, seen, reference)
-    before = copied(state)
-    for array in state:
-        array.flags.writeable = False
-    once = law.step(state, PERIOD, later, next_)
-    twice = law.step(state, PERIOD, later, next_)
-    assert all(same(a, b) for a, b in zip(once, twice, strict=True))
-    assert same(state, before)
-    # A sensor may write its next sample where the last one was.
-    returned = (*law.reset(seen, reference), *(array for part in once for array in part))
-    for given in (*seen, *reference, *later, *next_):
-        assert not any(np.shares_memory(array, given) for array in returned)
-
-
 @laws
 def test_alone_and_in_a_batch_are_the_same_bits(law: Any) -> None:
     count, rows = 64, 40
@@ -107,7 +82,7 @@ def test_alone_and_in_a_batch_are_the_same_bits(law: Any) -> None:
 
 
 @laws
-def test_any_leading_axes_will_do(law: Any) -> None:
+def test_any_leading_axes_are_accepted(law: Any) -> None:
     seen, reference = readings(6, 1)[0], wanted(1)[0]
     flat = law.step(law.reset(seen, reference), 0.0, seen, reference)
     for lead in ((2, 3), ()):
@@ -182,19 +157,6 @@ def test_a_bad_measurement_is_not_hidden(law: Any) -> None:
         _, command, _ = law.step(state, 0.0, seen._replace(rate=rate), reference)
     assert np.isnan(command.torque[0]).any()
     assert np.isfinite(command.torque[1]).all()
-
-
-def test_no_law_needs_the_physics_engine() -> None:
-    code = (
-        "import importlib, pkgutil, sys\n"
-        "sys.modules['mujoco'] = sys.modules['mcap'] = None\n"
-        "import mjspace.controllers as package\n"
-        "for found in pkgutil.walk_packages(package.__path__, package.__name__ + '.'):\n"
-        "    importlib.import_module(found.name)\n"
-        "    print(found.name.rpartition('.')[2])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert {"contraction", "immersion_invariance", "references"} <= set(done.stdout.split())
 
 
 @pytest.mark.parametrize(
