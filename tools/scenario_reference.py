@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 from mjspace.scenario.construct import controllers
 from mjspace.scenario.fields import Si
 from mjspace.scenario.scenario import Scenario
+from mjspace.scenario.sensors import KINDS, kinds
 
 PAGE = Path(__file__).parents[1] / "docs/scenario.md"
 HEAD = """# The scenario reference
@@ -48,10 +49,17 @@ def page() -> str:
         lines += ["| key | value | default | what |", "|---|---|---|---|"]
         for key, field in table.model_fields.items():
             inner = _table_in(field.annotation)
-            what = _line(field.description or (inner.__doc__ if inner else "") or "")
+            what = _line(_described(table, key) or (inner.__doc__ if inner else "") or "")
             lines.append(f"| `{key}` | {_value(field)} | {_default(field)} | {what} |")
         lines.append("")
     return "\n".join(lines + _laws())
+
+
+def _described(table: type[BaseModel], key: str) -> str:
+    """Return the key's description, which a class may leave to the one that it is based on."""
+    bases = [base for base in table.__mro__ if issubclass(base, BaseModel)]
+    found = [base.model_fields[key] for base in bases if key in base.model_fields]
+    return next((field.description for field in found if field.description), "")
 
 
 def _laws() -> list[str]:
@@ -93,7 +101,10 @@ def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseM
     yield path, table
     for key, field in table.model_fields.items():
         inner = _table_in(field.annotation)
-        if inner is not None:
+        if table is Scenario and key == "sensors":
+            for quantity, kind in zip(KINDS, kinds(), strict=True):
+                yield f'[sensors.<name>] with measures = "{quantity}"', kind
+        elif inner is not None:
             name = f"{path.strip('[]')}.{key}".lstrip(".")
             many = get_origin(field.annotation)
             heading = {list: f"[[{name}]]", dict: f"[{name}.<name>]"}.get(many, f"[{name}]")
@@ -109,6 +120,8 @@ def _table_in(annotation: Any) -> type[BaseModel] | None:
 def _value(field: FieldInfo) -> str:
     """Return what a key holds, as a person says it."""
     annotation = field.annotation
+    if field is Scenario.model_fields["sensors"]:
+        return "tables by name"
     if _table_in(annotation):
         many = {list: "tables", dict: "tables by name"}
         return many.get(get_origin(annotation), "table")

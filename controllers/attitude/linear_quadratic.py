@@ -142,7 +142,8 @@ class Regulator(Gains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the torque on the bus, -h', and what it is made of."""
-        seen, rate, wheel_speed, *_ = measurement
+        seen, rate = measurement.attitude, measurement.rate
+        wheel_speed = measurement.wheel_speed
         vehicle = (self.inertia, self.wheel_axes, self.wheel_inertia)
         torque, *shown = kernels.linear(
             seen, rate, *reference, wheel_speed, self.gain_at(time), *vehicle, self._full_rate

@@ -74,7 +74,8 @@ class _OnWheels(Gains, ABC):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the next state, the torque on the bus, -h', and what it is made of."""
-        seen, rate, wheel_speed, *_ = measurement
+        seen, rate = measurement.attitude, measurement.rate
+        wheel_speed = measurement.wheel_speed
         wheels = (self.wheel_axes, self.wheel_inertia)
         torque, error, k, u, *after = kernels.quaternion(
             seen, rate, reference.attitude, wheel_speed, *state, *wheels, self._gains

@@ -74,9 +74,8 @@ class Navigation(Gains):
         """Return the belief at the start, at the position, velocity and attitude measured then.
 
         Raises:
-            ValueError: one of the sensors is missing.
+            AttributeError: one of the sensors is missing.
         """
-        _require_sensors(measurement)
         seen = measurement
         lead = seen.rate.shape[:-1]
         spread = [self.position_fix, self.velocity_fix, self.attitude_fix]
@@ -115,10 +114,3 @@ class Navigation(Gains):
         aids = [self.altimeter_noise, self.velocimeter_noise]
         moon = [self.gravity_parameter, self.moon_radius]
         return np.array([*inertial, *walks, *aids, *moon, self.control_period])
-
-
-def _require_sensors(measurement: Measurement) -> None:
-    names = ("position", "velocity", "specific_force", "altitude", "ground_velocity")
-    for name in names:
-        if not getattr(measurement, name).shape[-1]:
-            raise ValueError(f"no {name} is measured: the estimator needs {', '.join(names)}")

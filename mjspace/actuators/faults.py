@@ -17,7 +17,7 @@ from mjspace.units import whole_number
 from mjspace.vehicle.indices import is_thruster
 
 STREAM = 1000
-"""First number of the faults' random streams; the sensors' are the fields of ``Measurement``."""
+"""First number of the faults' random streams; the sensors' are hashes of their names."""
 _WAITING, _IN_FORCE, _OVER = 0.0, 1.0, 2.0
 
 

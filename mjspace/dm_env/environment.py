@@ -105,11 +105,11 @@ class Physics(bridge.Physics):  # type: ignore[misc]
 
     def truth(self) -> Measurement:
         """Return what ideal sensors see, without a vehicle axis."""
-        return Measurement(*(values[0] for values in self._truth()))
+        return self._truth()._map(lambda values: values[0])
 
     def measurement(self) -> Measurement:
         """Return what the sensors report, without a vehicle axis."""
-        return Measurement(*(values[0] for values in self._measurement))
+        return self._measurement._map(lambda values: values[0])
 
     def momentum(self) -> Array:
         """Return the total angular momentum about the centre of mass, inertial [N m s], (3,)."""

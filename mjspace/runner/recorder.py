@@ -30,8 +30,6 @@ UNITS = {
         "position_error": "m",
         "tilt": "rad",
         "altitude": "m",
-        "ground_velocity": "m/s",
-        "magnetic_field": "T",
         "thrust": "N",
         "propellant": "kg",
         "momentum": "N m s",
@@ -49,12 +47,6 @@ UNITS = {
         "gimbal_rate": "rad/s",
         "wheel_angle": "rad",
         "current": "A",
-        "position": "m",
-        "velocity": "m/s",
-        "specific_force": "m/s^2",
-        "altitude": "m",
-        "ground_velocity": "m/s",
-        "magnetic_field": "T",
         "thrust": "N",
         "propellant": "kg",
     },
@@ -87,6 +79,17 @@ UNITS = {
 }
 
 
+def units_of(assembly: Assembly) -> dict[str, dict[str, str]]:
+    """Return the unit of each field of each topic that has one, the sensors' as they declare it."""
+    sensors = assembly.scenario.sensors.items()
+    reported = {name: sensor.unit for name, sensor in sensors if sensor.unit}
+    true = {sensor.measures: sensor.unit for _, sensor in sensors if sensor.unit}
+    return UNITS | {
+        "/truth": UNITS["/truth"] | true,
+        "/measurement": UNITS["/measurement"] | reported,
+    }
+
+
 class Recorder:
     """The open log of one vehicle's flight; a context manager."""
 
@@ -113,7 +116,7 @@ class Recorder:
             provenance.metadata(assembly.scenario, compiled, member),
             attachments,
             scene(model),
-            UNITS,
+            units_of(assembly),
         )
         self._model, self._data = model, mujoco.MjData(model)
         self._stride = max(1, round(FRAME_PERIOD / assembly.scenario.rates.control))

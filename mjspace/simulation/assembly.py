@@ -19,7 +19,7 @@ from mjspace.actuators.motor_drives import MotorDrives
 from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.actuators.thrusters import Thrusters
 from mjspace.contract import Array, Law, ReferenceSource
-from mjspace.environment import central_gravity, install
+from mjspace.environment import central_gravity, install, kepler
 from mjspace.environment.geomagnetism import FieldAlongOrbit, along
 from mjspace.errors import input_error_at
 from mjspace.scenario.construct import construct, load_object
@@ -28,6 +28,7 @@ from mjspace.scenario.landing import Engine
 from mjspace.scenario.plant import PlantTable
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.user_files import files_of, source_of
+from mjspace.sensors.base import Surroundings
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact, indices
@@ -75,8 +76,17 @@ class Assembly:
             scenario.rates,
             scenario.seed,
             members,
+            self.surroundings,
+        )
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What the sensors need to know of the vehicle and of where it flies."""
+        return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
             gravity=self._gravity,
+            magnetic_field=None if self.field is None else self.field.at,
+            orbit_position=None if self.scenario.environment.orbit is None else self._on_orbit,
         )
 
     @property
@@ -110,6 +120,14 @@ class Assembly:
         if table is None:
             return np.zeros_like(position)
         return central_gravity.acceleration(central_gravity.pack(table), position)
+
+    def _on_orbit(self, time: Array) -> Array:
+        """Return the position on the orbit [m], inertial axes, (..., 3), at each ``time`` [s]."""
+        table = self.scenario.environment.orbit
+        assert table is not None
+        orbit = kepler.pack(table)
+        places = [kepler.position(orbit, float(instant)) for instant in np.ravel(time)]
+        return np.array(places).reshape(*np.shape(time), 3)
 
 
 def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None) -> Assembly:

@@ -122,7 +122,12 @@ class Recording:
                     ..., None
                 ],
             },
-            "/measurement": _fields(self.measurement[:n]),
+            "/measurement": _without_empty(
+                {
+                    name: np.array([vars(measured)[name] for measured in self.measurement[:n]])
+                    for name in self.measurement[0]._fields
+                }
+            ),
             "/reference": {
                 name: np.broadcast_to(a, (n, physics.shape[1], a.shape[-1]))
                 for name, a in reference.items()

@@ -4,6 +4,7 @@ import functools
 import importlib
 import inspect
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -85,10 +86,10 @@ def inputs(kind: str) -> tuple[Any, float, list[tuple[Measurement, Reference]]]:
 
 def frozen(arrays: Any) -> Any:
     """Return copies that nobody may write to."""
-    copies = [np.array(array) for array in arrays]
-    for array in copies:
+    copies = {name: np.array(array) for name, array in arrays._asdict().items()}
+    for array in copies.values():
         array.flags.writeable = False
-    return type(arrays)(*copies)
+    return type(arrays)(**copies)
 
 
 def leaves(parts: Any) -> list[np.ndarray]:
@@ -143,7 +144,7 @@ def test_it_is_a_pure_function(kind: str) -> None:
     assert same(once, twice)
     assert all(np.array_equal(a, b) for a, b in zip(before, leaves(state), strict=True))
     # a sensor may write its next sample where the last one was
-    kept = [array for seen, wanted in instants for array in (*seen, *wanted)]
+    kept = [array for seen, wanted in instants for array in (*seen._asdict().values(), *wanted)]
     assert not any(np.shares_memory(leaf, a) for leaf in leaves(first) for a in kept)
 
 
@@ -153,8 +154,7 @@ def test_one_vehicle_alone_is_the_same_bits(kind: str) -> None:
     batch = leaves(outcome(law, period, instants))
     for index in range(COUNT):
         lone = [
-            (type(seen)(*(a[index : index + 1] if a.size else a for a in seen)), wanted)
-            for seen, wanted in instants
+            (seen._map(itemgetter(slice(index, index + 1))), wanted) for seen, wanted in instants
         ]
         alone = leaves(outcome(law, period, lone))
         for one, many in zip(alone, batch, strict=True):

@@ -34,10 +34,10 @@ pytestmark = [
 
 SHORT = "duration=0.048"  # a whole number of all control periods here
 NOISY = [
-    "sensors.rate.noise=0.01",
+    "sensors.rate.noise_std=0.01",
     "sensors.rate.bias_walk=0.001",
     "sensors.rate.period='3 ms'",
-    "sensors.attitude.noise=1e-4",
+    "sensors.attitude.noise_std=1e-4",
     "sensors.attitude.delay='8 ms'",
     "sensors.wheel_speed.quantization=0.1",
     "plant.wheels.torque_limit=5",
@@ -121,7 +121,9 @@ def seen(step: TimeStep) -> tuple[Measurement, Reference]:
     """Return what a law sees, with the measurement's vehicle axis."""
     observation = step.observation
     return (
-        Measurement(*(observation[n][None] for n in Measurement._fields if n in observation)),
+        Measurement(
+            **{n: a[None] for n, a in observation.items() if not n.startswith("reference_")}
+        ),
         Reference(*(observation[f"reference_{name}"] for name in Reference._fields)),
     )
 
@@ -133,7 +135,9 @@ def fly_law(environment: Any, law: Any) -> tuple[list[np.ndarray], list[np.ndarr
     while True:
         states.append(environment.physics.get_state(INTEGRATION))
         measurement, reference = seen(step)
-        measurements.append(np.concatenate([m for m in measurement if m.size], axis=1)[0])
+        measurements.append(
+            np.concatenate([m for m in measurement._asdict().values() if m.size], axis=1)[0]
+        )
         if step.last():
             return states, measurements
         if memory is None:
@@ -172,7 +176,7 @@ def test_the_law_flies_the_same_flight_bit_for_bit(
     blocks = list(fly(built, first_start(built, [0])))
     physics = np.concatenate([block.rows["/state"]["physics"][:, 0] for block in blocks])
     reports = [block.rows["/measurement"] for block in blocks]
-    logged = [name for name in Measurement._fields if name in reports[0]]
+    logged = list(reports[0])
     measured = np.concatenate(
         [np.concatenate([report[n][:, 0] for n in logged], 1) for report in reports]
     )
@@ -241,7 +245,7 @@ def test_the_action_is_bounded_by_what_the_wheels_give() -> None:
 )
 def test_the_reward_is_the_tightest_bound_over_the_error(checks: str, rewards: list[float]) -> None:
     # Of the true error: the star tracker's say nothing of it.
-    environment = at_rest(f"checks={checks}", "sensors.attitude.noise=0.1")
+    environment = at_rest(f"checks={checks}", "sensors.attitude.noise_std=0.1")
     environment.reset()
     earned = [environment.step(np.zeros(3)).reward for _ in range(50)]
     # At rest and without torque nothing moves, but for rounding.
