@@ -1,7 +1,8 @@
 """What passes between a vehicle, its sensors, a reference and a control law."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, field, fields
-from typing import Annotated, Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,52 +16,123 @@ TICK = 1e-9
 """s: instants that are closer than this are one; it is what the stamps of a log can tell apart."""
 
 
-class Measurement(NamedTuple):
-    """What the sensors report at a control instant; a leading vehicle axis may precede each shape.
+_NONE = np.zeros(0)
+_NONE.setflags(write=False)
 
-    A vehicle without wheels has ``wheel_speed`` of shape ``(0,)``, and so it is with every sensor
-    that a scenario may leave out.
+
+class Measurement:
+    """What is measured at a control instant; a leading vehicle axis may precede each shape.
+
+    An array for each sensor, under the sensor's name, and for each quantity that the plant reports
+    by itself. A quantity is what the sensor of the same name reports, or else the first sensor
+    declared for it: ``measurement.attitude`` is ``measurement.st_1`` where ``st_1`` is the first of
+    several star trackers. Reading a quantity that no sensor measures raises an AttributeError that
+    names the table to add. Attributes cannot be assigned; ``_replace`` returns a changed copy.
     """
 
     attitude: Array
     """Quaternion, scalar first, body to inertial, shape (..., 4)."""
     rate: Annotated[Array, Unit("rad/s")]
     """Angular velocity relative to inertial, body axes [rad/s], shape (..., 3)."""
-    wheel_speed: Annotated[Array, Unit("rad/s", display="rpm")]
+    position: Annotated[Array, Unit("m")]
+    """Of the bus, inertial axes [m], shape (..., 3)."""
+    velocity: Annotated[Array, Unit("m/s")]
+    """Of the bus, inertial axes [m/s], shape (..., 3)."""
+    specific_force: Annotated[Array, Unit("m/s^2")]
+    """Specific force at the bus's origin, body axes [m/s^2], shape (..., 3): the mean since the
+    accelerometer's last sample."""
+    altitude: Annotated[Array, Unit("m")]
+    """Height of the bus above the plane z = 0 [m], shape (..., 1)."""
+    ground_velocity: Annotated[Array, Unit("m/s")]
+    """Velocity of the bus, body axes [m/s], shape (..., 3)."""
+    magnetic_field: Annotated[Array, Unit("T")]
+    """Of the Earth, body axes [T], shape (..., 3)."""
+
+    # Reported by the plant: empty where the vehicle has nothing of the kind.
+    wheel_speed: Annotated[Array, Unit("rad/s", display="rpm")] = _NONE
     """Wheel speeds relative to what carries them [rad/s], shape (..., n)."""
-    gimbal_angle: Annotated[Array, Unit("rad")] = np.zeros(0)
+    gimbal_angle: Annotated[Array, Unit("rad")] = _NONE
     """Gimbal angles, the outer before the inner [rad], shape (..., g)."""
-    gimbal_rate: Annotated[Array, Unit("rad/s")] = np.zeros(0)
+    gimbal_rate: Annotated[Array, Unit("rad/s")] = _NONE
     """Gimbal rates relative to what carries them [rad/s], shape (..., g)."""
-    current: Annotated[Array, Unit("A")] = np.zeros(0)
+    current: Annotated[Array, Unit("A")] = _NONE
     """(I_d, I_q) of each motor that has an electrical side [A], shape (..., m, 2); its windings'
     currents where the drive works in the stator's axes."""
-    position: Annotated[Array, Unit("m")] = np.zeros(0)
-    """Of the bus, inertial axes [m], shape (..., 3)."""
-    velocity: Annotated[Array, Unit("m/s")] = np.zeros(0)
-    """Of the bus, inertial axes [m/s], shape (..., 3)."""
-    specific_force: Annotated[Array, Unit("m/s^2")] = np.zeros(0)
-    """What an accelerometer at the bus's origin feels, body axes [m/s^2], shape (..., 3): the mean
-    since its last sample."""
-    altitude: Annotated[Array, Unit("m")] = np.zeros(0)
-    """Height of the bus above the plane z = 0 [m], shape (..., 1)."""
-    ground_velocity: Annotated[Array, Unit("m/s")] = np.zeros(0)
-    """What a velocimeter shows: of the bus, body axes [m/s], shape (..., 3)."""
-    thrust: Annotated[Array, Unit("N")] = np.zeros(0)
+    thrust: Annotated[Array, Unit("N")] = _NONE
     """Of the engine, then of each thruster [N], shape (..., n)."""
-    propellant: Annotated[Array, Unit("kg")] = np.zeros(0)
+    propellant: Annotated[Array, Unit("kg")] = _NONE
     """Left in the tank, the engine's before the thrusters' [kg], shape (..., n)."""
-    contact: Array = np.zeros(0)
+    contact: Array = _NONE
     """1.0 while at least two feet or the hull touch the ground, else 0.0, shape (..., 1)."""
-    wheel_angle: Annotated[Array, Unit("rad")] = np.zeros(0)
+    wheel_angle: Annotated[Array, Unit("rad")] = _NONE
     """Angles of the wheels with an electrical side, relative to what carries them [rad], shape
     (..., n)."""
-    magnetic_field: Annotated[Array, Unit("T")] = np.zeros(0)
-    """Of the Earth, body axes [T], shape (..., 3)."""
-    foot_contact: Array = np.zeros(0)
+    foot_contact: Array = _NONE
     """1.0 for each foot that touches the ground, else 0.0, shape (..., f)."""
-    hull_contact: Array = np.zeros(0)
+    hull_contact: Array = _NONE
     """1.0 while anything else of the vehicle touches the ground, else 0.0, shape (..., 1)."""
+
+    def __init__(self, **arrays: Array) -> None:
+        self.__dict__.update(arrays)
+
+    def __getattr__(self, name: str) -> Array:
+        """Refuse a name that nothing is measured under.
+
+        Raises:
+            AttributeError: with the table to add, and the names that there are.
+        """
+        if name.startswith("_"):
+            raise AttributeError(name)
+        have = ", ".join(name for name, array in self.__dict__.items() if np.size(array))
+        raise AttributeError(f"no sensor measures {name}: add [sensors.{name}] (measured: {have})")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError("a measurement is read-only")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError("a measurement is read-only")
+
+    def __repr__(self) -> str:
+        return f"Measurement({', '.join(f'{name}={a!r}' for name, a in self.__dict__.items())})"
+
+    @property
+    def _fields(self) -> tuple[str, ...]:
+        """The names of the sensors and of the plant's quantities."""
+        return tuple(self.__dict__)
+
+    def _asdict(self) -> dict[str, Array]:
+        """Return the arrays by name, without copying them."""
+        return self.__dict__.copy()
+
+    def _replace(self, **changes: Array) -> Self:
+        """Return a copy in which these arrays are others, or are measured as well."""
+        return type(self)(**self.__dict__ | changes)
+
+    def _map(self, function: Callable[[Array], Array]) -> Self:
+        """Return a copy with ``function`` applied to each array, as ``lambda a: a[0]``."""
+        return type(self)(**{name: function(array) for name, array in self.__dict__.items()})
+
+    @classmethod
+    def _with_sensors(cls, measured: Mapping[str, str]) -> type[Self]:
+        """Return the class for sensors that are ``measured`` (name: quantity), in that order."""
+        first = {quantity: name for name, quantity in reversed(list(measured.items()))}
+        other = {q: _Report(name) for q, name in first.items() if q not in measured}
+        return type(cls.__name__, (cls,), other) if other else cls
+
+
+class _Report:
+    """Under a quantity's name, what a sensor of another name reports."""
+
+    def __init__(self, sensor: str) -> None:
+        self.sensor = sensor
+
+    def __get__(self, measurement: Measurement, owner: Any = None) -> Array:
+        return measurement.__dict__[self.sensor]  # type: ignore[no-any-return]
+
+
+REPORTED_BY_PLANT = tuple(name for name in Measurement.__annotations__ if name in vars(Measurement))
+"""The quantities of a ``Measurement`` that a vehicle reports without a sensor of their own; of
+those, wheel speeds come from the tachometers, which every vehicle has."""
 
 
 class Truth(NamedTuple):
@@ -94,7 +166,7 @@ class Truth(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """The wanted motion at a control instant, the same for every vehicle of a batch."""
+    """The desired motion at a control instant, the same for every vehicle of a batch."""
 
     attitude: Array
     """Quaternion, scalar first, desired body axes to inertial, shape (..., 4)."""

@@ -143,7 +143,9 @@ def _seen(y: Array) -> Measurement:
     """Return the state in our axes: (x, y, z) is the paper's (Y, Z, X)."""
     row = y[_OURS][None]
     attitude, rate, place, speed = row[:, :4], row[:, 4:7], row[:, 7:10], row[:, 10:]
-    return Measurement(attitude, rate, _NOTHING, position=place, velocity=speed)
+    return Measurement(
+        attitude=attitude, rate=rate, wheel_speed=_NOTHING, position=place, velocity=speed
+    )
 
 
 _OURS = np.array([6, 8, 9, 7, 11, 12, 10, 1, 2, 0, 4, 5, 3])

@@ -11,6 +11,7 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import BaseModel, RootModel
 
+from mjspace.scenario import sensors
 from mjspace.scenario.construct import controllers
 from mjspace.scenario.equipment import type_of
 from mjspace.scenario.loading import load, scenario_names
@@ -105,7 +106,7 @@ def first(value: Any) -> Any:
 def tables() -> dict[type[BaseModel], list[dict[str, Any]]]:
     """Return each table of a scenario with examples of it, from the scenarios and by default."""
     found: dict[type[BaseModel], list[dict[str, Any]]] = {}
-    for kind in _kinds_in(Scenario):
+    for kind in (*_kinds_in(Scenario), *sensors.kinds()):
         try:
             found[kind] = [kind().model_dump(mode="python")]
         except ValueError:

@@ -68,7 +68,7 @@ def fly(
     state = None
     for k in range(rows):
         seen_rate = y[4:7] if rate_noise is None else y[4:7] + rate_noise[k]
-        seen = Measurement(y[None, :4], seen_rate[None], y[None, 7:])
+        seen = Measurement(attitude=y[None, :4], rate=seen_rate[None], wheel_speed=y[None, 7:])
         now = Reference(*(part[k] for part in wanted))
         if state is None:
             state = law.reset(seen, now)

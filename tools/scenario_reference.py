@@ -17,6 +17,7 @@ from mjspace.scenario.construct import controllers
 from mjspace.scenario.equipment import DeclaredIn, type_of
 from mjspace.scenario.fields import Si
 from mjspace.scenario.scenario import Scenario
+from mjspace.scenario.sensors import KINDS, kinds
 
 PAGE = Path(__file__).parents[1] / "docs/scenario.md"
 HEAD = """# The scenario reference
@@ -49,10 +50,17 @@ def page() -> str:
         lines += ["| key | value | default | what |", "|---|---|---|---|"]
         for key, field in table.model_fields.items():
             inner = _table_in(type_of(field))
-            what = _line(field.description or (inner.__doc__ if inner else "") or "")
+            what = _line(_described(table, key) or (inner.__doc__ if inner else "") or "")
             lines.append(f"| `{key}` | {_value(field)} | {_default(field)} | {what} |")
         lines.append("")
     return "\n".join(lines + _laws())
+
+
+def _described(table: type[BaseModel], key: str) -> str:
+    """Return the key's description, which a class may leave to the one that it is based on."""
+    bases = [base for base in table.__mro__ if issubclass(base, BaseModel)]
+    found = [base.model_fields[key] for base in bases if key in base.model_fields]
+    return next((field.description for field in found if field.description), "")
 
 
 def _laws() -> list[str]:
@@ -94,7 +102,10 @@ def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseM
     yield path, table
     for key, field in table.model_fields.items():
         inner = _table_in(type_of(field))
-        if inner is not None:
+        if table is Scenario and key == "sensors":
+            for quantity, kind in zip(KINDS, kinds(), strict=True):
+                yield f'[sensors.<name>] with measures = "{quantity}"', kind
+        elif inner is not None:
             name = f"{path.strip('[]')}.{key}".lstrip(".")
             many = get_origin(type_of(field))
             heading = {list: f"[[{name}]]", dict: f"[{name}.<name>]"}.get(many, f"[{name}]")
@@ -110,6 +121,8 @@ def _table_in(annotation: Any) -> type[BaseModel] | None:
 def _value(field: FieldInfo) -> str:
     """Return what a key holds, as a person says it."""
     annotation = type_of(field)
+    if field is Scenario.model_fields["sensors"]:
+        return "tables by name"
     if _table_in(annotation):
         many = {list: "tables", dict: "tables by name"}
         return many.get(get_origin(annotation), "table")

@@ -108,7 +108,8 @@ class Ideal(Gains):
         self, state: IdealState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[IdealState, TorqueCommand, IdealSignals]:
         """Return the next state, the torque and the errors."""
-        measured, rate, wheel_speed, *_ = measurement
+        measured, rate = measurement.attitude, measurement.rate
+        wheel_speed = measurement.wheel_speed
         vehicle = (wheel_speed, self.inertia, self.wheel_axes, self.wheel_inertia, self._gains)
         torque, e, wd, attitude = kernels.ideal(measured, rate, *reference, *state, *vehicle)
         return IdealState(attitude), TorqueCommand(torque), IdealSignals(e, wd)
@@ -149,7 +150,7 @@ class Gradient(Gains):
         self, state: GradientState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[GradientState, TorqueCommand, GradientSignals]:
         """Return the next state, the torque, the errors and the estimates."""
-        measured, rate, *_ = measurement
+        measured, rate = measurement.attitude, measurement.rate
         torque, e, wd, *after = kernels.gradient(measured, rate, *reference, *state, self._gains)
         return GradientState(*after), TorqueCommand(torque), GradientSignals(e, wd, state.theta_hat)
 
@@ -212,7 +213,7 @@ class Adaptive(Gains):
         self, state: AdaptiveState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[AdaptiveState, TorqueCommand, AdaptiveSignals]:
         """Return the next state, the torque, the errors and the estimates."""
-        measured, rate, *_ = measurement
+        measured, rate = measurement.attitude, measurement.rate
         torque, e, wd, eps, *after = kernels.adaptive(
             measured, rate, *reference, *state, self._gains
         )

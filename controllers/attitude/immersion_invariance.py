@@ -72,7 +72,8 @@ class ImmersionInvariance(Gains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the next state, the torque and the errors."""
-        torque, x_e, z, *angles = _law(*measurement[:3], *reference, *state, *self._vehicle)
+        measured = measurement.attitude, measurement.rate, measurement.wheel_speed
+        torque, x_e, z, *angles = _law(*measured, *reference, *state, *self._vehicle)
         after = State(*angles)
         singularity = 0.5 * pi - np.abs(after.angles[..., 1:2])
         return after, TorqueCommand(torque), Signals(x_e, z, singularity)

@@ -142,7 +142,8 @@ class Regulator(Gains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the torque on the bus, -h', and the signals."""
-        measured, rate, wheel_speed, *_ = measurement
+        measured, rate = measurement.attitude, measurement.rate
+        wheel_speed = measurement.wheel_speed
         vehicle = (self.inertia, self.wheel_axes, self.wheel_inertia)
         torque, *signals = kernels.linear(
             measured, rate, *reference, wheel_speed, self.gain_at(time), *vehicle, self._full_rate

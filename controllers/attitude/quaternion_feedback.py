@@ -74,7 +74,8 @@ class _WheelLaw(Gains, ABC):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the next state, the torque on the bus, -h', and the signals."""
-        measured, rate, wheel_speed, *_ = measurement
+        measured, rate = measurement.attitude, measurement.rate
+        wheel_speed = measurement.wheel_speed
         wheels = (self.wheel_axes, self.wheel_inertia)
         torque, error, k, u, *after = kernels.quaternion(
             measured, rate, reference.attitude, wheel_speed, *state, *wheels, self._gains

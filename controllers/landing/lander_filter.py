@@ -72,9 +72,8 @@ class Navigation(LunarGravity):
         """Return the initial estimates, with position, velocity and attitude as measured.
 
         Raises:
-            ValueError: the measurement lacks one of the sensors.
+            AttributeError: one of the sensors is missing.
         """
-        _require_sensors(measurement)
         lead = measurement.rate.shape[:-1]
         spread = [self.position_fix, self.velocity_fix, self.attitude_fix]
         spread += [self.accelerometer_bias, self.gyro_bias]
@@ -112,10 +111,3 @@ class Navigation(LunarGravity):
         aids = [self.altimeter_noise, self.velocimeter_noise]
         moon = [self.gravity_parameter, self.moon_radius]
         return np.array([*inertial, *walks, *aids, *moon, self.control_period])
-
-
-def _require_sensors(measurement: Measurement) -> None:
-    names = ("position", "velocity", "specific_force", "altitude", "ground_velocity")
-    for name in names:
-        if not getattr(measurement, name).shape[-1]:
-            raise ValueError(f"no {name} is measured: the estimator needs {', '.join(names)}")

@@ -49,9 +49,11 @@ class Until(Gains):
 
     def _parsed(self) -> tuple[str, int | None]:
         name, bracket, part = self.signal.removesuffix("]").partition("[")
-        if name not in Measurement._fields or (bracket and not part.isdigit()):
-            have = ", ".join(Measurement._fields)
-            raise ValueError(f"until.signal: got {self.signal!r}, should be one of {have}")
+        if not name.isidentifier() or bool(bracket) != part.isdigit():
+            raise ValueError(
+                f"until.signal: got {self.signal!r}, should be what is measured or a component of "
+                "it, as 'rate' or 'rate[2]'"
+            )
         return name, int(part) if bracket else None
 
 
@@ -106,6 +108,8 @@ class Phases:
         hints: dict[str, Any] = {}
         signal_hints: dict[str, Any] = {}
         for phase in self.phases:
+            if phase.until is not None:
+                phase.until.holds(np.zeros(lead), measurement)  # refuses what is not measured
             states.append(phase.law.reset(measurement, reference))
             _, command, own = phase.law.step(states[-1], 0.0, measurement, reference)
             commands |= {n: a.shape[len(lead) :] for n, a in _arrays(command).items()}

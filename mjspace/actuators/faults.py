@@ -19,7 +19,7 @@ from mjspace.signals import find_signal, magnitude
 from mjspace.units import any_to_si
 
 STREAM = 1000
-"""First number of the faults' random streams; the sensors' are the fields of ``Measurement``."""
+"""First number of the faults' random streams; the sensors' are hashes of their names."""
 _WAITING, _IN_FORCE, _OVER = 0.0, 1.0, 2.0
 _WITH_VALUE = [name for name, kind in KINDS.items() if kind.has_value]
 

@@ -126,11 +126,11 @@ class Physics(bridge.Physics):  # type: ignore[misc]
 
     def truth(self) -> Measurement:
         """Return the truth, without a vehicle axis."""
-        return Measurement(*(values[0] for values in self._period.truth))
+        return self._period.truth._map(lambda values: values[0])
 
     def measurement(self) -> Measurement:
         """Return what the sensors report, without a vehicle axis."""
-        return Measurement(*(values[0] for values in self._period.measurement))
+        return self._period.measurement._map(lambda values: values[0])
 
     def memory(self) -> dict[str, Array]:
         """Return what actuators, step effects and sensors remember, by the names of /state."""

@@ -1,5 +1,6 @@
 """A flight's log: its attachments, and blocks of control periods as they are flown."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -17,6 +18,21 @@ from mjspace.units import Unit
 from mjspace.vehicle import vehicle
 
 FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
+
+
+def units_of(assembly: Assembly, kinds: Mapping[str, type] = {}) -> dict[str, dict[str, Unit]]:
+    """Return the unit of each logged field by topic, as contract, law, actuators and sensors say.
+
+    ``kinds`` are the named tuples that the flight records, by topic.
+    """
+    units = topics.units(kinds)
+    for topic, declared in assembly.actuators.units.items():
+        units[topic] |= {name: Unit(unit) for name, unit in declared.items()}
+    for name, sensor in assembly.scenario.sensors.items():
+        if sensor.unit:
+            units["/measurement"].setdefault(name, Unit(sensor.unit))
+            units["/truth"].setdefault(sensor.measures, Unit(sensor.unit))
+    return units
 
 
 class Recorder:
@@ -39,16 +55,13 @@ class Recorder:
             is_code = name.endswith(".py")
             media_type = "text/x-python" if is_code else "application/octet-stream"
             attachments[name] = (media_type, content)
-        units = topics.units(first.kinds)
-        for topic, declared in assembly.actuators.units.items():
-            units[topic] = units[topic] | {n: Unit(unit) for n, unit in declared.items()}
         self._log = LogWriter(
             path,
             shapes(first),
             provenance.metadata(assembly.scenario, compiled, member),
             attachments,
             scene(model),
-            units,
+            units_of(assembly, first.kinds),
         )
         self._model, self._data = model, mujoco.MjData(model)
         self._stride = max(1, round(FRAME_PERIOD / assembly.scenario.rates.control))

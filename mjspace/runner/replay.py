@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import tempfile
+import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.contract import Measurement
+from mjspace.contract import REPORTED_BY_PLANT
 from mjspace.errors import InputError, input_error_at
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
@@ -38,12 +39,15 @@ class Difference:
     index: int
     logged: float
     flown: float
+    reason: str = ""
+    """Why it has to differ, where that is known."""
 
     def __str__(self) -> str:
         """Return it as one line."""
+        reason = f": {self.reason}" if self.reason else ""
         return (
             f"{self.topic}.{self.field}[{self.index}] differs first at t = {self.time:.6g} s: "
-            f"logged {self.logged!r}, flown {self.flown!r}"
+            f"logged {self.logged!r}, flown {self.flown!r}{reason}"
         )
 
 
@@ -111,11 +115,28 @@ def verify(
             }
             found = first_difference(logged, flown)
             if found is not None:
-                return found
+                return dataclasses.replace(found, reason=_other_streams(log, assembly.scenario))
             progress(float(block.time[-1]))
             if len(logged["/state"]["time"]) < len(block.time):
                 break  # the log ends here: its flight was interrupted
     return None
+
+
+def _other_streams(log: Log, scenario: Scenario) -> str:
+    """Return that the log's noise was drawn otherwise, where an earlier version drew it; else ''.
+
+    Sensors without ``measures`` are of versions whose random streams were numbered, not named.
+    """
+    logged = tomllib.loads(log.attachment("scenario.toml").decode()).get("sensors", {})
+    named = all("measures" in table for table in logged.values())
+    random = any(s.noise_std or s.bias_std or s.bias_walk for s in scenario.sensors.values())
+    if named or not random:
+        return ""
+    return (
+        "an earlier version of mjspace wrote the log, whose sensors had other random streams: "
+        f"verify it with version {log.metadata.get('mjspace', '')}, revision "
+        f"{log.metadata.get('git') or 'unknown'}"
+    )
 
 
 @contextmanager
@@ -191,11 +212,13 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     )
     law_state: Any = None
     if not fresh_law:
-        seen = log.read("/measurement", None, *near)
-        wanted = reference_at(assembly.reference, np.array([number * period]))
+        absent = dict.fromkeys(REPORTED_BY_PLANT, np.empty((1, 0)))
+        logged = log.read("/measurement", None, *near)
+        measured = {name: values for name, values in logged.items() if name != "time"}
+        desired = reference_at(assembly.reference, np.array([number * period]))
         template = assembly.law.reset(
-            Measurement(**{n: seen.get(n, np.empty((1, 0))) for n in Measurement._fields}),
-            type(wanted)(*(values[0] for values in wanted)),
+            assembly.sensors([0]).measurement(**absent | measured),
+            type(desired)(*(values[0] for values in desired)),
         )
         names = getattr(template, "_fields", ())
         missing = [name for name in names if f"law_{name}" not in state]

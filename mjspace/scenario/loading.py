@@ -17,6 +17,7 @@ from mjspace.scenario import overrides as keys
 from mjspace.scenario.construct import plain
 from mjspace.scenario.equipment import type_of
 from mjspace.scenario.scenario import Component, Scenario
+from mjspace.scenario.sensors import kinds
 
 
 def scenario_names() -> list[str]:
@@ -206,6 +207,8 @@ def _explain(key: str, problem: Any) -> str:
 
 def _keys_at(parents: list[Any]) -> list[str]:
     """Return the keys of the table at that place of the scenario."""
+    if parents[:1] == ["sensors"] and len(parents) > 1:
+        return list(dict.fromkeys(key for kind in kinds() for key in kind.model_fields))
     model: type[BaseModel] | None = Scenario
     for part in parents:
         if isinstance(part, int) or model is None:

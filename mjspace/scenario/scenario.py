@@ -20,7 +20,7 @@ from mjspace.scenario.equipment import DeclaredIn
 from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
-from mjspace.scenario.sensors import Sensors
+from mjspace.scenario.sensors import Sensors, check_sensors
 from mjspace.units import any_to_si, whole_number
 
 
@@ -162,7 +162,8 @@ class Scenario(Table):
     plant: PlantTable = Field(default_factory=PlantTable)
     initial: Initial = Initial()
     environment: Environment = Environment()
-    sensors: Sensors = Sensors()
+    sensors: Sensors = Field({}, validate_default=True)
+    """By name. Attitude, rate and wheel speed are measured ideally where no sensor is declared."""
     reference: Component
     law: Component
     faults: list[Annotated[Any, DeclaredIn("mjspace.actuators.faults:Fault", optional=False)]] = []
@@ -190,22 +191,22 @@ class Scenario(Table):
         return self
 
     @model_validator(mode="after")
-    def _magnets_in_a_field(self) -> "Scenario":
-        magnets = {
-            "plant.magnetorquers": self.plant.magnetorquers,
-            "sensors.magnetic_field": self.sensors.magnetic_field,
-        }
-        for key, table in magnets.items():
-            if table is not None and self.environment.magnetic_field is None:
-                raise ValueError(f"{key}: needs an [environment.magnetic_field]")
+    def _magnetorquers_in_a_field(self) -> "Scenario":
+        if self.plant.magnetorquers is not None and self.environment.magnetic_field is None:
+            raise ValueError("plant.magnetorquers: needs an [environment.magnetic_field]")
+        return self
+
+    @model_validator(mode="after")
+    def _something_to_measure(self) -> "Scenario":
+        check_sensors(self.sensors, self.environment)
         return self
 
     @model_validator(mode="after")
     def _whole_periods(self, info: ValidationInfo) -> "Scenario":
         step = self.rates.physics
         spans: dict[str, float | None] = {"rates.control": self.rates.control}
-        for name, sensor in self.sensors:
-            spans[f"sensors.{name}.period"] = None if sensor is None else sensor.period
+        for name, sensor in self.sensors.items():
+            spans[f"sensors.{name}.period"] = sensor.period
         for key, span in spans.items():
             if span is not None:
                 whole_number(span, step, key, "rates.physics")

@@ -1,118 +1,93 @@
-"""The tables of a scenario's sensors."""
+"""A scenario's sensors, by name: their kinds, and which quantity each measures."""
 
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any
 
-from mjspace.scenario.fields import NonNegative, Seconds, Si, Table, Time
+from pydantic import BaseModel, BeforeValidator, ValidationInfo
 
+from mjspace.contract import REPORTED_BY_PLANT
+from mjspace.errors import nearest
+from mjspace.scenario.environment import Environment
+from mjspace.scenario.fields import Name
 
-class SensorTiming(Table):
-    """When a sensor samples and when it reports."""
-
-    period: Seconds | None = None
-    """Time between samples, a whole number of integration steps; else the control period."""
-    delay: Time = 0.0
-    """Age of a sample when it is reported, a whole number of sample periods."""
-
-
-class StarTracker(SensorTiming):
-    """Attitude sensor; its errors are small rotations about the body axes. Ideal by default."""
-
-    noise: Annotated[NonNegative, Si("rad")] = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Annotated[NonNegative, Si("rad")] = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Annotated[NonNegative, Si("rad")] = 0.0
-    """Standard deviation that the bias's random walk has after one second."""
-    quantization: Annotated[NonNegative, Si("rad")] = 0.0
-    """Size of the least significant digit."""
-
-
-class RateSensor(SensorTiming):
-    """Gyro or tachometer. Ideal by default."""
-
-    noise: Annotated[NonNegative, Si("rad/s")] = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Annotated[NonNegative, Si("rad/s")] = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Annotated[NonNegative, Si("rad/s")] = 0.0
-    """Standard deviation that the bias's random walk has after one second."""
-    quantization: Annotated[NonNegative, Si("rad/s")] = 0.0
-    """Size of the least significant digit."""
+KINDS = {
+    "attitude": "mjspace.sensors.star_tracker:StarTracker",
+    "rate": "mjspace.sensors.gyro:Gyro",
+    "wheel_speed": "mjspace.sensors.tachometer:Tachometer",
+    "position": "mjspace.sensors.position:PositionFix",
+    "velocity": "mjspace.sensors.velocity:VelocityFix",
+    "altitude": "mjspace.sensors.altimeter:Altimeter",
+    "ground_velocity": "mjspace.sensors.velocimeter:Velocimeter",
+    "specific_force": "mjspace.sensors.accelerometer:Accelerometer",
+    "magnetic_field": "mjspace.sensors.magnetometer:Magnetometer",
+    "nadir": "mjspace.sensors.horizon:HorizonSensor",
+}
+"""The sensor of each quantity, "module:Class": the class is imported when a scenario is read."""
+ALWAYS = ("attitude", "rate", "wheel_speed")
+"""Quantities that an ideal sensor measures where the scenario declares none."""
 
 
-class PlaceSensor(SensorTiming):
-    """Something that shows a length. Ideal by default."""
+def kind_of(quantity: str) -> Any:
+    """Return the class of the sensors that measure the ``quantity``.
 
-    noise: Annotated[NonNegative, Si("m")] = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Annotated[NonNegative, Si("m")] = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Annotated[NonNegative, Si("m")] = 0.0
-    """Standard deviation that the bias's random walk has after one second."""
-    quantization: Annotated[NonNegative, Si("m")] = 0.0
-    """Size of the least significant digit."""
-
-
-class SpeedSensor(SensorTiming):
-    """Something that shows a velocity. Ideal by default."""
-
-    noise: Annotated[NonNegative, Si("m/s")] = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Annotated[NonNegative, Si("m/s")] = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Annotated[NonNegative, Si("m/s")] = 0.0
-    """Standard deviation that the bias's random walk has after one second."""
-    quantization: Annotated[NonNegative, Si("m/s")] = 0.0
-    """Size of the least significant digit."""
+    Raises:
+        ValueError: none does, with the near names.
+    """
+    if quantity not in KINDS:
+        raise ValueError(f"no sensor measures {quantity!r}{nearest(str(quantity), KINDS)}")
+    module, _, name = KINDS[quantity].partition(":")
+    return getattr(import_module(module), name)
 
 
-class Accelerometer(SensorTiming):
-    """Mean specific force since the last sample. Ideal by default."""
-
-    noise: Annotated[NonNegative, Si("m/s^2")] = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Annotated[NonNegative, Si("m/s^2")] = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Annotated[NonNegative, Si("m/s^2")] = 0.0
-    """Standard deviation that the bias's random walk has after one second."""
-    quantization: Annotated[NonNegative, Si("m/s^2")] = 0.0
-    """Size of the least significant digit."""
+def kinds() -> list[type[BaseModel]]:
+    """Return the class of each kind of sensor."""
+    return [kind_of(quantity) for quantity in KINDS]
 
 
-class Magnetometer(SensorTiming):
-    """Something that shows the magnetic field. Ideal by default."""
+def _with_quantities(tables: Any) -> Any:
+    """Return the tables, each with its quantity, after those of the ideal sensors."""
+    if not isinstance(tables, dict):
+        return tables
+    named = {
+        name: {"measures": name, **table} if isinstance(table, dict) else table
+        for name, table in tables.items()
+    }
+    measured = [
+        table["measures"] if isinstance(table, dict) else getattr(table, "measures", None)
+        for table in named.values()
+    ]
+    ideal = {name: {"measures": name} for name in ALWAYS if name not in measured}
+    return {**ideal, **named}
 
-    noise: Annotated[NonNegative, Si("T")] = 0.0
-    """Standard deviation of the white noise of each sample, on each axis."""
-    bias: Annotated[NonNegative, Si("T")] = 0.0
-    """Standard deviation of the constant bias drawn at the start, on each axis."""
-    bias_walk: Annotated[NonNegative, Si("T")] = 0.0
-    """Standard deviation that the bias's random walk has after one second."""
-    quantization: Annotated[NonNegative, Si("T")] = 0.0
-    """Size of the least significant digit."""
+
+def _of_its_kind(table: Any, info: ValidationInfo) -> Any:
+    """Return the sensor that a table describes."""
+    if isinstance(table, BaseModel):
+        return table
+    if not isinstance(table, dict):
+        raise ValueError(f"got {table!r}, should be a table")
+    return kind_of(table["measures"]).model_validate(table, context=info.context)
 
 
-Errors = StarTracker | RateSensor | PlaceSensor | SpeedSensor | Accelerometer | Magnetometer
+Sensors = Annotated[
+    dict[Name, Annotated[Any, BeforeValidator(_of_its_kind)]], BeforeValidator(_with_quantities)
+]
+"""The sensors by their names, in the order in which the scenario declares them."""
 
 
-class Sensors(Table):
-    """The vehicle's sensors."""
+def check_sensors(sensors: dict[str, Any], environment: Environment) -> None:
+    """Refuse a sensor whose name is taken, or that has nothing to measure.
 
-    attitude: StarTracker = StarTracker()
-    """Star tracker."""
-    rate: RateSensor = RateSensor()
-    """Gyro."""
-    wheel_speed: RateSensor = RateSensor()
-    """Wheel tachometers."""
-    position: PlaceSensor | None = None
-    """Where the bus is; no such sensor when left out."""
-    velocity: SpeedSensor | None = None
-    """Velocity of the bus, inertial axes; no such sensor when left out."""
-    altitude: PlaceSensor | None = None
-    """Altimeter: the bus's height above z = 0; none when left out."""
-    ground_velocity: SpeedSensor | None = None
-    """Velocimeter: the bus's velocity in body axes; none when left out."""
-    specific_force: Accelerometer | None = None
-    """Accelerometers at the bus's origin; none when left out."""
-    magnetic_field: Magnetometer | None = None
-    """Magnetometer, which the magnetorquers do not disturb; none when left out."""
+    Raises:
+        ValueError: with the sensor's key.
+    """
+    for name, sensor in sensors.items():
+        if name != sensor.measures and name in (*KINDS, *REPORTED_BY_PLANT):
+            raise ValueError(
+                f"sensors.{name}: {name} is a quantity, which this sensor does not measure: call "
+                "it otherwise"
+            )
+        try:
+            sensor.check_environment(environment)
+        except ValueError as error:
+            raise ValueError(f"sensors.{name}: {error}") from None

@@ -1,28 +1,17 @@
 """A vehicle's sensors: the truth, sampled late, with errors, and held in between."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, sin, sqrt
+from math import sqrt
 from typing import Any
 
-import numba
 import numpy as np
 
-from mjspace.contract import Array, Measurement
+from mjspace.contract import REPORTED_BY_PLANT, Array, Measurement
 from mjspace.scenario.plant import Rates
-from mjspace.scenario.sensors import Errors, Sensors
-from mjspace.sensors.accelerometer import Strapdown
-from mjspace.sensors.noise import normals
+from mjspace.sensors.base import Sensor, State, Surroundings
+from mjspace.sensors.noise import normals, stream_of
 from mjspace.units import whole_number
-
-NAVIGATION = ("position", "velocity", "altitude", "ground_velocity", "specific_force")
-OPTIONAL = (*NAVIGATION, "magnetic_field")
-"""The fields of ``Measurement`` whose sensors a scenario may leave out."""
-
-State = dict[str, Array]
-"""What the sensors remember, vehicle axis first. Each one that is not ideal has
-``<sensor>_samples`` (N, delay + 1, width), its last reports in ``Measurement``'s units, the oldest
-first; each whose bias walks also has ``<sensor>_walk`` (N, axes), the walk at the next sample."""
 
 
 class SensorSuite:
@@ -30,60 +19,61 @@ class SensorSuite:
 
     A sensor takes sample j at integration step j * period. It reports the newest sample that is at
     least ``delay`` old, and its first until there is one. An ideal sensor has no state and reports
-    the truth's own array, which is no copy.
+    the truth's own array, which is no copy. Each other one has ``<name>_samples`` (N, delay + 1,
+    width), its last reports, the oldest first; each whose bias walks also has ``<name>_walk``
+    (N, axes), the walk at the next sample.
 
     Attributes:
         ticks: the sampling periods of the sensors that are not ideal, in integration steps;
             ``sample`` is to be called at every multiple of each.
+        measurement: the class of what ``sample`` returns, which knows each quantity's sensor.
     """
 
     def __init__(
         self,
-        sensors: Sensors,
+        sensors: Mapping[str, Sensor[Any]],
         rates: Rates,
         seed: int,
         members: Sequence[int],
-        wheels: int,
-        gravity: Callable[[Array], Array] = np.zeros_like,
+        surroundings: Surroundings,
     ) -> None:
         """Draw the constant biases of ``members``, the vehicles' numbers in the campaign ``seed``.
 
-        A member measures the same alone or in any batch. ``gravity`` gives what accelerometers do
-        not feel, [m/s^2], at each position [m], both (N, 3) in inertial axes.
+        A member measures the same alone or in any batch, whatever other sensors it has.
 
         Raises:
-            ValueError: a period is no whole number of integration steps, a delay no whole number of
-                periods, or the attitude's quantization is coarser than a quaternion can show.
+            ValueError: a period is no whole number of integration steps, or a delay no whole number
+                of periods.
         """
-        if sensors.attitude.quantization >= 1.0:
-            raise ValueError(
-                f"sensors.attitude.quantization {sensors.attitude.quantization:g} rad: "
-                "must be less than 1 rad"
-            )
-        widths = {"wheel_speed": wheels, "altitude": 1}
+        self._surroundings = surroundings
+        self.measurement = Measurement._with_sensors(
+            {name: table.measures for name, table in sensors.items()}
+        )
         every = [
-            _sensor(name, table, rates, seed, members, widths.get(name, 3))
-            for name, table in sensors
-            if table is not None
+            _sampled(name, table, rates, seed, members, surroundings.wheels)
+            for name, table in sensors.items()
         ]
-        self._sensors = [sensor for sensor in every if sensor is not None]
-        self._absent = [name for name in OPTIONAL if getattr(sensors, name) is None]
-        self._ideal = not self._sensors and len(self._absent) == len(OPTIONAL)
-        self._strapdown = None
-        if sensors.specific_force is not None:
-            period = next(s.period for s in self._sensors if s.name == "specific_force")
-            self._strapdown = Strapdown(gravity, period, rates.physics)
-        self.ticks = frozenset(sensor.period for sensor in self._sensors)
+        self._sampled = [sensor for sensor in every if sensor is not None]
+        own = {sensor.name for sensor in self._sampled}
+        self._ideal = {n: table.measures for n, table in sensors.items() if n not in own}
+        self._reported = [name for name in REPORTED_BY_PLANT if name != "wheel_speed"]
+        # The fields of a truth that is reported as it is, without a copy.
+        same = not self._sampled and all(name == q for name, q in self._ideal.items())
+        self._as_it_is = {*self._ideal, *self._reported} if same else set()
+        self.ticks = frozenset(sensor.period for sensor in self._sampled)
 
     def reset(self, truth: Measurement) -> State:
-        """Return the state before the first sample, at step 0, where the ``truth`` is given."""
+        """Return the state before the first sample, at step 0, where the truth is ``truth``."""
         state: State = {}
-        if self._strapdown is not None:
-            truth = truth._replace(specific_force=self._strapdown.reset(state, truth))
-        for sensor in self._sensors:
-            if sensor.walk:
+        for sensor in self._sampled:
+            table = sensor.table
+            if table.integrates:
+                value = table.begin(state, sensor.name, truth)
+            else:
+                value = getattr(truth, table.measures)
+            if table.bias_walk:
                 state[sensor.walk_field] = np.zeros_like(sensor.bias)
-            first = sensor.read(state, 0, getattr(truth, sensor.name))
+            first = sensor.read(state, 0, value)
             state[sensor.samples_field] = np.repeat(first[:, None], sensor.delay + 1, axis=1)
         return state
 
@@ -92,124 +82,96 @@ class SensorSuite:
     ) -> tuple[State, Measurement]:
         """Return (state, measurement) at integration step ``step_index``.
 
-        ``truth`` has a vehicle axis: attitude (N, 4), rate (N, 3), wheel_speed (N, n). ``state`` is
-        left as it is, so that this step may be sampled from it again.
+        ``truth`` has a vehicle axis and each quantity by its name: attitude (N, 4), rate (N, 3).
+        ``state`` is left as it is, so that this step may be sampled from it again.
         """
-        if self._ideal:
+        arrays = truth._asdict()
+        if arrays.keys() == self._as_it_is:
             return state, truth
-        state = state.copy()
-        seen = truth._asdict()
-        if self._strapdown is not None and step_index % self._strapdown.period == 0:
-            seen["specific_force"] = self._strapdown.take(state, step_index, truth)
-        for sensor in self._sensors:
-            if step_index % sensor.period == 0:
-                sensor.take(state, step_index // sensor.period, seen[sensor.name])
-            seen[sensor.name] = state[sensor.samples_field][:, 0]
-        for name in self._absent:
-            seen[name] = seen[name][:, :0]
-        return state, Measurement(**seen)
+        reports = {name: arrays[quantity] for name, quantity in self._ideal.items()}
+        if self._sampled:
+            state = state.copy()
+            for sensor in self._sampled:
+                if step_index % sensor.period == 0:
+                    self._take(sensor, state, step_index, truth)
+                reports[sensor.name] = state[sensor.samples_field][:, 0]
+        for name in self._reported:
+            reports[name] = arrays[name]
+        return state, self.measurement(**reports)
+
+    def _take(self, sensor: "_Sampled", state: State, step_index: int, truth: Measurement) -> None:
+        """Put the sample of this step, and the walk that follows it, into ``state``."""
+        table, index = sensor.table, step_index // sensor.period
+        if not table.integrates:
+            value = getattr(truth, table.measures)
+        elif index == 0:
+            value = table.begin(state, sensor.name, truth)
+        else:
+            value = table.mean(state, sensor.name, truth, sensor.span, self._surroundings)
+        new = sensor.read(state, index, value)[:, None]
+        if sensor.delay:
+            new = np.concatenate([state[sensor.samples_field][:, 1:], new], axis=1)
+        state[sensor.samples_field] = new
+        if table.bias_walk:
+            walk = sensor.walk * sensor.increment(index)
+            state[sensor.walk_field] = state[sensor.walk_field] + walk
 
 
 @dataclass(frozen=True)
-class _Sensor:
+class _Sampled:
+    """A sensor that is not ideal, with the random streams of each vehicle's."""
+
     name: str
+    table: Sensor[Any]
     period: int  # integration steps
+    span: float  # of a period [s]
     delay: int  # samples
     bias: Array  # (N, axes)
-    noise: float
     white: Callable[[int], Array]
     walk: float  # standard deviation of one period's increment
     increment: Callable[[int], Array]
-    quantization: float
-    distort: Callable[[Array, Array, float], Array]
     samples_field: str
     walk_field: str
 
     def read(self, state: State, index: int, truth: Array) -> Array:
-        """Return what sample ``index`` shows of the ``truth``."""
+        """Return what sample ``index`` reports of the ``truth``."""
         error = self.bias
-        if self.noise:
-            error = error + self.noise * self.white(index)
-        if self.walk:
+        if self.table.noise_std:
+            error = error + self.table.noise_std * self.white(index)
+        if self.table.bias_walk:
             error = error + state[self.walk_field]
-        return self.distort(truth, error, self.quantization)
-
-    def take(self, state: State, index: int, truth: Array) -> None:
-        """Put sample ``index`` and the walk that follows it into ``state``."""
-        new = self.read(state, index, truth)[:, None]
-        if self.delay:
-            new = np.concatenate([state[self.samples_field][:, 1:], new], axis=1)
-        state[self.samples_field] = new
-        if self.walk:
-            state[self.walk_field] = state[self.walk_field] + self.walk * self.increment(index)
+        return self.table.with_error(truth, error)
 
 
-def _sensor(
+def _sampled(
     name: str,
-    table: Errors,
+    table: Sensor[Any],
     rates: Rates,
     seed: int,
     members: Sequence[int],
-    axes: int,
-) -> _Sensor | None:
-    """Return the sensor, or None when at every control instant it shows the truth itself."""
+    wheels: int,
+) -> _Sampled | None:
+    """Return the sensor, or None when at every control instant it reports the truth itself."""
     period_key = "rates.control" if table.period is None else f"sensors.{name}.period"
     seconds = rates.control if table.period is None else table.period
     period = whole_number(seconds, rates.physics, period_key, "rates.physics")
-    control = rates.steps
-    errors = (table.noise, table.bias, table.bias_walk, table.quantization, table.delay)
-    follows = name != "specific_force"  # which is a mean over its own period
-    if follows and not any(errors) and control % period == 0:
+    if not (table.errs or table.integrates or table.delay or rates.steps % period):
         return None
     delay = table.delay and whole_number(table.delay, seconds, f"sensors.{name}.delay", period_key)
-    number = Measurement._fields.index(name)
-    constant, white, increment = (normals(seed, members, (number, part), axes) for part in range(3))
-    return _Sensor(
+    width = wheels if table.width is None else table.width
+    axes = width if table.axes is None else table.axes
+    stream = stream_of(name)
+    constant, white, increment = (normals(seed, members, (stream, part), axes) for part in range(3))
+    return _Sampled(
         name=name,
+        table=table,
         period=period,
+        span=period * rates.physics,
         delay=int(delay),
-        bias=table.bias * constant(0),
-        noise=table.noise,
+        bias=table.bias_std * constant(0),
         white=white,
         walk=table.bias_walk * sqrt(seconds),
         increment=increment,
-        quantization=table.quantization,
-        distort=_turn if name == "attitude" else _shift,
         samples_field=f"{name}_samples",
         walk_field=f"{name}_walk",
     )
-
-
-def _shift(truth: Array, error: Array, digit: float) -> Array:
-    value = truth + error
-    return np.rint(value / digit) * digit if digit else value
-
-
-def _turn(truth: Array, error: Array, digit: float) -> Array:
-    """Return the attitude turned by the rotation vector ``error``, in digits of ``digit``, in rad.
-
-    What is rounded is what a star tracker sends: the four components of the quaternion, to
-    digit / 2. Being orthogonal to its rates of change about the body axes, it then has the error of
-    an angle rounded to ``digit``, digit / sqrt(12), about every axis in every attitude, which
-    rounded Euler angles or rotation vectors have not.
-    """
-    turned: Array = _turn_kernel(truth, error, digit)
-    return turned
-
-
-@numba.guvectorize(["void(f8[:], f8[:], f8, f8[:])"], "(q),(a),()->(q)", cache=True)
-def _turn_kernel(q: Any, error: Any, digit: Any, turned: Any) -> None:
-    angle = sqrt(error[0] * error[0] + error[1] * error[1] + error[2] * error[2])
-    scale = sin(0.5 * angle) / angle if angle > 0.0 else 0.5
-    w, x, y, z = cos(0.5 * angle), scale * error[0], scale * error[1], scale * error[2]
-    turned[0] = q[0] * w - q[1] * x - q[2] * y - q[3] * z
-    turned[1] = q[0] * x + q[1] * w + q[2] * z - q[3] * y
-    turned[2] = q[0] * y - q[1] * z + q[2] * w + q[3] * x
-    turned[3] = q[0] * z + q[1] * y - q[2] * x + q[3] * w
-    if digit > 0.0:
-        square = 0.0
-        for i in range(turned.size):
-            turned[i] = np.rint(2.0 * turned[i] / digit)
-            square += turned[i] * turned[i]
-        for i in range(turned.size):
-            turned[i] /= sqrt(square)

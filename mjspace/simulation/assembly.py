@@ -13,7 +13,7 @@ from mjspace.actuators.actuator_set import ActuatorSet
 from mjspace.actuators.base import Actuator, Context
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array, Law, ReferenceSource
-from mjspace.environment import central_gravity, install
+from mjspace.environment import central_gravity, install, kepler
 from mjspace.environment.geomagnetism import FieldAlongOrbit, along
 from mjspace.errors import input_error_at
 from mjspace.scenario.construct import construct, load_object
@@ -21,6 +21,7 @@ from mjspace.scenario.hinges import Friction
 from mjspace.scenario.plant import PlantTable
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.user_files import files_of, source_of
+from mjspace.sensors.base import Surroundings
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact
@@ -67,8 +68,17 @@ class Assembly:
             scenario.rates,
             scenario.seed,
             members,
+            self.surroundings,
+        )
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What the sensors need to know of the vehicle and of where it flies."""
+        return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
             gravity=self._gravity,
+            magnetic_field=None if self.field is None else self.field.at,
+            orbit_position=None if self.scenario.environment.orbit is None else self._on_orbit,
         )
 
     @property
@@ -101,6 +111,14 @@ class Assembly:
         if table is None:
             return np.zeros_like(position)
         return central_gravity.acceleration(central_gravity.pack(table), position)
+
+    def _on_orbit(self, time: Array) -> Array:
+        """Return the position on the orbit [m], inertial axes, (..., 3), at each ``time`` [s]."""
+        table = self.scenario.environment.orbit
+        assert table is not None
+        orbit = kepler.pack(table)
+        places = [kepler.position(orbit, float(instant)) for instant in np.ravel(time)]
+        return np.array(places).reshape(*np.shape(time), 3)
 
 
 def assemble(

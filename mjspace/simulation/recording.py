@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from mjspace import attitude
-from mjspace.contract import Array, DesiredMotion, Event
+from mjspace.contract import Array, DesiredMotion, Event, Measurement
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.state_layout import StateLayout
@@ -121,7 +121,7 @@ class Recording:
                     ..., None
                 ],
             },
-            "/measurement": _fields(self._column("measurement")),
+            "/measurement": _measured(self._column("measurement")),
             "/reference": {
                 name: np.broadcast_to(a, (n, physics.shape[1], a.shape[-1]))
                 for name, a in reference.items()
@@ -169,6 +169,12 @@ def _position_errors(
 def _stacked(states: list[dict[str, Array]]) -> dict[str, Array]:
     """Return named arrays of several periods with a period axis."""
     return {name: np.array([state[name] for state in states]) for name in states[0]}
+
+
+def _measured(measurements: list[Measurement]) -> dict[str, Array]:
+    """Return what each sensor reported as arrays with a period axis; without what is empty."""
+    names = measurements[0]._fields
+    return _without_empty({n: np.array([vars(m)[n] for m in measurements]) for n in names})
 
 
 def _fields(tuples: list[Any]) -> dict[str, Array]:

@@ -5,10 +5,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace import attitude
-from mjspace.contract import Array, Measurement, Truth
+from mjspace.contract import REPORTED_BY_PLANT, Array, Measurement, Truth
 from mjspace.environment import kepler
-from mjspace.sensors.suite import NAVIGATION
+from mjspace.sensors.base import Motion
+from mjspace.sensors.magnetometer import Magnetometer
+from mjspace.sensors.velocimeter import Velocimeter
 from mjspace.simulation.assembly import Assembly
 
 
@@ -32,69 +33,70 @@ class StateLayout:
         self.wheel_angle = _columns(before_qpos + vehicle.wheel_qpos)
         self.struts = _columns(before_qpos + vehicle.strut_qpos)
         self.feet = len(vehicle.strut_qpos)
-        sensors = assembly.scenario.sensors
-        self.navigates = any(getattr(sensors, name) is not None for name in NAVIGATION)
-        self.has_velocimeter = sensors.ground_velocity is not None
-        self.has_magnetometer = sensors.magnetic_field is not None
-        self.field = assembly.field
+        kinds = {sensor.measures: sensor for sensor in assembly.scenario.sensors.values()}
+        self.translates = any(sensor.of_translation for sensor in kinds.values())
+        self.surroundings = assembly.surroundings
+        known = ("attitude", "rate", "wheel_speed", "position", "velocity", "altitude")
+        self.measured = {
+            quantity: sensor
+            for quantity, sensor in kinds.items()
+            if quantity not in known and not sensor.integrates
+        }
         orbit = assembly.scenario.environment.orbit
         self.orbit = None if orbit is None else kepler.pack(orbit)
 
     def truth(self, physics: Array) -> Measurement:
-        """Return what ideal sensors see, as views of the state rows where that is possible.
+        """Return what ideal sensors report, as views of the state rows where that is possible.
 
         Nothing touches the ground: that is in the memory of the step effect of the contacts.
         """
-        seen = self.motion(physics)
+        truth = self.motion(physics)
         if self.feet:
             none = np.zeros((*physics.shape[:-1], self.feet))
             one = none[..., :1]
-            seen = seen._replace(contact=one, foot_contact=none, hull_contact=one)
-        if self.navigates:
+            truth = truth._replace(contact=one, foot_contact=none, hull_contact=one)
+        if self.translates:
             position, velocity = physics[..., self.position], physics[..., self.velocity]
-            seen = seen._replace(position=position, velocity=velocity, altitude=position[..., 2:])
-        if self.has_velocimeter:
-            seen = seen._replace(ground_velocity=self.velocity_in_body_axes(physics))
-        if self.has_magnetometer:
-            seen = seen._replace(magnetic_field=self.magnetic_field(physics))
-        return seen
+            truth = truth._replace(position=position, velocity=velocity, altitude=position[..., 2:])
+        if self.measured:
+            motion = self.moving_bus(physics)
+            measured = {name: sensor.true_value(motion) for name, sensor in self.measured.items()}
+            truth = truth._replace(**measured)
+        return truth
 
     def with_surroundings(self, physics: Array, truth: Measurement) -> Truth:
         """Return all of the ``truth`` at ``physics``, (N, nstate), whatever sensors there are."""
-        position = physics[..., self.position]
+        motion = self.moving_bus(physics)
         known = truth._asdict() | {
-            "position": position,
-            "velocity": physics[..., self.velocity],
-            "altitude": position[..., 2:],
-            "ground_velocity": self.velocity_in_body_axes(physics),
-            "magnetic_field": self.magnetic_field(physics),
+            "position": motion.position,
+            "velocity": motion.velocity,
+            "altitude": motion.position[..., 2:],
+            "ground_velocity": Velocimeter().true_value(motion),
+            "magnetic_field": Magnetometer().true_value(motion),
         }
-        del known["specific_force"]  # a mean since an accelerometer's last sample
         vehicles, time = len(physics), float(physics[0, 0])
         place = np.empty(0) if self.orbit is None else kepler.position(self.orbit, time)
-        motion = np.empty(0) if self.orbit is None else kepler.velocity(self.orbit, time)
-        return Truth(
-            **known,
-            orbit_position=np.tile(place, (vehicles, 1)),
-            orbit_velocity=np.tile(motion, (vehicles, 1)),
+        speed = np.empty(0) if self.orbit is None else kepler.velocity(self.orbit, time)
+        known["orbit_position"] = np.tile(place, (vehicles, 1))
+        known["orbit_velocity"] = np.tile(speed, (vehicles, 1))
+        return Truth(**{name: known[name] for name in Truth._fields})
+
+    def moving_bus(self, physics: Array) -> Motion:
+        """Return the bus's motion, as views of the state rows."""
+        return Motion(
+            physics[..., 0],  # the row begins with the time
+            physics[..., self.attitude],
+            physics[..., self.rate],
+            physics[..., self.wheel_speed],
+            physics[..., self.position],
+            physics[..., self.velocity],
+            self.surroundings,
         )
 
-    def velocity_in_body_axes(self, physics: Array) -> Array:
-        """Return the bus's velocity, body axes [m/s]."""
-        to_body = attitude.conjugate(physics[..., self.attitude])
-        return attitude.rotate(to_body, physics[..., self.velocity])
-
-    def magnetic_field(self, physics: Array) -> Array:
-        """Return the Earth's magnetic field, body axes [T]; empty where there is none."""
-        if self.field is None:
-            return physics[..., :0]
-        field = self.field.at(physics[..., 0])  # the row begins with the time
-        return attitude.rotate(attitude.conjugate(physics[..., self.attitude]), field)
-
     def motion(self, physics: Array) -> Measurement:
-        """Return the truth of what turns alone: all that motors feel."""
-        absent = dict.fromkeys(Measurement._fields, physics[..., :0])
-        turning = {
+        """Return the truth of what turns alone: all that acts on the motors."""
+        arrays = dict.fromkeys(REPORTED_BY_PLANT, physics[..., :0])
+        arrays |= {
             "attitude": physics[..., self.attitude],
             "rate": physics[..., self.rate],
             "wheel_speed": physics[..., self.wheel_speed],
@@ -102,7 +104,7 @@ class StateLayout:
             "gimbal_rate": physics[..., self.gimbal_rate],
             "wheel_angle": physics[..., self.wheel_angle],
         }
-        return Measurement(**absent | turning)
+        return Measurement(**arrays)
 
 
 def _columns(indices: Any) -> Any:

@@ -18,7 +18,7 @@ class UnbatchedLaw:
 
     def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
         """Return the law's state with a vehicle axis."""
-        states = [self._law.reset(one, reference) for one in _vehicles(measurement)]
+        states = [self._law.reset(one, reference) for one in _measured(measurement)]
         for state in states:
             check_state(state)
         return _stack("state", states)
@@ -30,12 +30,19 @@ class UnbatchedLaw:
         states = _vehicles(state) if state else [state] * len(measurement.rate)
         flown = [
             self._law.step(s, time, m, reference)
-            for s, m in zip(states, _vehicles(measurement), strict=True)
+            for s, m in zip(states, _measured(measurement), strict=True)
         ]
         for returned in flown:
             check_step(returned)
         after, commands, signals = zip(*flown, strict=True)
         return _stack("state", after), _stack("command", commands), _stack("signals", signals)
+
+
+def _measured(measurement: Measurement) -> list[Measurement]:
+    """Return the measurement of each vehicle, without the vehicle axis."""
+    kind, names = type(measurement), measurement._fields
+    rows = zip(*measurement._asdict().values(), strict=True)
+    return [kind(**dict(zip(names, row, strict=True))) for row in rows]
 
 
 def _vehicles(arrays: Any) -> list[Any]:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mjspace.contract import Array, DesiredMotion, Reference, ReferenceSource
+from mjspace.contract import Array, DesiredMotion, Measurement, Reference, ReferenceSource
 from mjspace.errors import FlightError
 
 Tuple = TypeVar("Tuple", bound=Iterable[Any])
@@ -35,12 +35,12 @@ def read_only(arrays: Tuple) -> Tuple:
     return arrays
 
 
-def sealed(arrays: Tuple) -> Tuple:
-    """Return the named tuple after making its arrays read-only; views are of read-only arrays."""
-    for array in arrays:
+def sealed(measurement: Measurement) -> Measurement:
+    """Return it after making its arrays read-only; those that are views are of read-only arrays."""
+    for array in vars(measurement).values():
         if array.flags.writeable:
             array.setflags(write=False)
-    return arrays
+    return measurement
 
 
 def failure(who: str, error: Exception) -> FlightError:

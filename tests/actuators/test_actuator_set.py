@@ -24,7 +24,11 @@ from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
 
-TRUTH = Measurement(np.array([[1.0, 0.0, 0.0, 0.0]] * 2), np.zeros((2, 3)), np.zeros((2, 3)))
+TRUTH = Measurement(
+    attitude=np.array([[1.0, 0.0, 0.0, 0.0]] * 2),
+    rate=np.zeros((2, 3)),
+    wheel_speed=np.zeros((2, 3)),
+)
 LAW = """
 from typing import NamedTuple
 import numpy as np

@@ -27,7 +27,7 @@ SPEED = ISP * STANDARD_GRAVITY
 TANK = """<mujoco><worldbody><body name="cold_gas_tank">
   <inertial pos="0 0 0" mass="0.05" diaginertia="2e-4 2e-4 2e-4"/></body></worldbody></mujoco>"""
 NOTHING = np.zeros((1, 0))
-TRUTH = Measurement(NOTHING, NOTHING, NOTHING, thrust=NOTHING, propellant=NOTHING)
+TRUTH = Measurement(thrust=NOTHING, propellant=NOTHING)
 
 
 def thrusters(count: int = 1, **keys: Any) -> ColdGasThrusters:

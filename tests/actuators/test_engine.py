@@ -29,7 +29,13 @@ def engine(*, gravity: float = 0.0, thrust: float | None = None, **table: Any) -
 
 def seen(angle: Any = ((0.0, 0.0),), rate: Any = ((0.0, 0.0),)) -> Measurement:
     one = np.zeros((len(angle), 0))
-    return Measurement(one, one, one, np.array(angle, float), np.array(rate, float))
+    return Measurement(
+        attitude=one,
+        rate=one,
+        wheel_speed=one,
+        gimbal_angle=np.array(angle, float),
+        gimbal_rate=np.array(rate, float),
+    )
 
 
 def burn(

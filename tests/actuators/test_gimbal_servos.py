@@ -37,7 +37,11 @@ def act(
     flown: GimbalServos, state: Any, wanted: Any, gimbal_rate: Any, wheel_speed: Any
 ) -> tuple[Any, Array, Array]:
     seen = Measurement(
-        NONE, NONE, np.array([wheel_speed]), np.zeros((1, 2)), np.array([gimbal_rate])
+        attitude=NONE,
+        rate=NONE,
+        wheel_speed=np.array([wheel_speed]),
+        gimbal_angle=np.zeros((1, 2)),
+        gimbal_rate=np.array([gimbal_rate]),
     )
     after, torque, cut = flown.act(state, GimbalRateCommand(np.array([wanted])), seen, STEP)
     return after, torque[0], cut[0]

@@ -87,7 +87,7 @@ def test_fourth_order_in_the_step() -> None:
 
 
 def test_coils_share_and_limit_the_moment() -> None:
-    truth = Measurement(*[np.zeros((2, 4)), np.zeros((2, 3)), np.zeros((2, 0))])
+    truth = Measurement(attitude=np.zeros((2, 4)), rate=np.zeros((2, 3)))
     skew = attitude.normalize(np.array([[1.0, 1, 0], [1, -1, 0], [0, 0, 1], [0, 1, 1]]))
     coils = CoilSet(skew, dipole_limit=4.0)
     asked = SimpleNamespace(dipole=np.array([[0.3, -0.5, 0.8], [100.0, 0.0, 0.0]]))
@@ -99,7 +99,7 @@ def test_coils_share_and_limit_the_moment() -> None:
 
 
 def test_moment_follows_with_a_lag() -> None:
-    truth = Measurement(*[np.zeros((1, 4)), np.zeros((1, 3)), np.zeros((1, 0))])
+    truth = Measurement(attitude=np.zeros((1, 4)), rate=np.zeros((1, 3)))
     coils, step = CoilSet(np.eye(3), 5.0, time_constant=0.7), 0.25
     asked = SimpleNamespace(dipole=np.array([[2.0, -9.0, 0.0]]))
     state, means = coils.reset(1), []
@@ -114,7 +114,7 @@ def test_moment_follows_with_a_lag() -> None:
 
 
 def test_magnetometer_shows_the_field_in_body_axes() -> None:
-    built = assemble(*load("b-dot-igrf", ["duration=200", "sensors.magnetic_field.noise=0"]))
+    built = assemble(*load("b-dot-igrf", ["duration=200", "sensors.magnetic_field.noise_std=0"]))
     (block,) = fly(built, first_start(built, [0]))
     seen, truth = block.rows["/measurement"]["magnetic_field"][:, 0], block.rows["/truth"]
     assert built.field is not None

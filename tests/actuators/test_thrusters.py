@@ -20,7 +20,9 @@ STEP, PERIOD, FORCE = 0.005, 0.02, 2.0  # s, s, N
 TANK = """<mujoco><worldbody><body name="rcs_tank">
   <inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"""
 NOTHING = np.zeros((1, 0))
-TRUTH = Measurement(NOTHING, NOTHING, NOTHING, thrust=NOTHING, propellant=NOTHING)
+TRUTH = Measurement(
+    attitude=NOTHING, rate=NOTHING, wheel_speed=NOTHING, thrust=NOTHING, propellant=NOTHING
+)
 
 
 def thrusters(count: int = 1, **keys: Any) -> Thrusters:

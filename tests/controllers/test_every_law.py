@@ -10,6 +10,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -91,14 +92,16 @@ def inputs(kind: str) -> tuple[Any, float, list[tuple[Measurement, Reference]]]:
 
 def frozen(arrays: Any) -> Any:
     """Return copies that nobody may write to."""
-    copies = [np.array(array) for array in arrays]
-    for array in copies:
+    copies = {name: np.array(array) for name, array in arrays._asdict().items()}
+    for array in copies.values():
         array.flags.writeable = False
-    return type(arrays)(*copies)
+    return type(arrays)(**copies)
 
 
 def leaves(parts: Any) -> list[np.ndarray]:
     """Return the arrays in named tuples of named tuples."""
+    if isinstance(parts, Measurement):
+        return [np.asarray(array) for array in parts._asdict().values()]
     if isinstance(parts, tuple):
         return [leaf for part in parts for leaf in leaves(part)]
     return [] if parts is None else [np.asarray(parts)]
@@ -129,7 +132,7 @@ UNWINDS = {"quaternion_feedback:Fixed"}
 
 def writable(instants: Any) -> Any:
     return [
-        tuple(type(arrays)(*map(np.array, arrays)) for arrays in instant) for instant in instants
+        (seen._map(np.array), type(desired)(*map(np.array, desired))) for seen, desired in instants
     ]
 
 
@@ -183,10 +186,7 @@ def is_batched(law: Any, period: float, instants: Any) -> None:
     batch = leaves(outcome(law, period, instants))
     for index in range(COUNT):
         part = slice(index, index + 1)
-        lone = [
-            (type(seen)(*(a[part] if a.size else a for a in seen)), desired)
-            for seen, desired in instants
-        ]
+        lone = [(seen._map(itemgetter(part)), desired) for seen, desired in instants]
         for one, many in zip(leaves(outcome(law, period, lone)), batch, strict=True):
             assert np.array_equal(one, many[part] if many.size else many, equal_nan=True)
 

@@ -3,6 +3,7 @@
 What every law must satisfy is in test_every_law.py.
 """
 
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -41,9 +42,11 @@ def readings(count: int, rows: int) -> list[Measurement]:
     found = []
     for _ in range(rows):
         seen = Measurement(
-            attitude, rate + 0.01 * rng.normal(size=(count, 3)), 50.0 * rate @ AXES.T
+            attitude=attitude,
+            rate=rate + 0.01 * rng.normal(size=(count, 3)),
+            wheel_speed=50.0 * rate @ AXES.T,
         )
-        for array in seen:
+        for array in seen._asdict().values():
             array.flags.writeable = False
         found.append(seen)
         attitude = att.multiply(attitude, att.from_rotation_vector(0.02 * rate))
@@ -64,8 +67,7 @@ def test_alone_and_in_a_batch_are_the_same_bits(law: Any) -> None:
     state = law.reset(flight[0], reference[0])
     shapes = [array.shape for array in state]
     lone = [
-        law.reset(Measurement(*(a[i : i + 1] for a in flight[0])), reference[0])
-        for i in range(count)
+        law.reset(flight[0]._map(itemgetter(slice(i, i + 1))), reference[0]) for i in range(count)
     ]
     for k in range(rows):
         state, command, signals = law.step(state, k * PERIOD, flight[k], reference[k])
@@ -73,7 +75,7 @@ def test_alone_and_in_a_batch_are_the_same_bits(law: Any) -> None:
         assert command.torque.shape == (count, 3)
         assert all(array.shape[0] == count and array.ndim > 1 for array in (*state, *signals))
         for i in range(count):
-            seen = Measurement(*(a[i : i + 1] for a in flight[k]))
+            seen = flight[k]._map(itemgetter(slice(i, i + 1)))
             lone[i], command_i, signals_i = law.step(lone[i], k * PERIOD, seen, reference[k])
             parts = zip(
                 (*state, *command, *signals), (*lone[i], *command_i, *signals_i), strict=True
@@ -86,7 +88,8 @@ def test_any_leading_axes_are_accepted(law: Any) -> None:
     seen, reference = readings(6, 1)[0], wanted(1)[0]
     flat = law.step(law.reset(seen, reference), 0.0, seen, reference)
     for lead in ((2, 3), ()):
-        shaped = Measurement(*(a[: int(np.prod(lead))].reshape(*lead, -1) for a in seen))
+        rows = seen._map(itemgetter(slice(int(np.prod(lead)))))._asdict()
+        shaped = Measurement(**{name: a.reshape(*lead, -1) for name, a in rows.items()})
         state, command, _ = law.step(law.reset(shaped, reference), 0.0, shaped, reference)
         assert command.torque.shape == (*lead, 3)
         assert np.array_equal(command.torque.reshape(-1, 3), flat[1].torque[: int(np.prod(lead))])

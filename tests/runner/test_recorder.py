@@ -26,7 +26,7 @@ OVERRIDES = [
     "duration=0.1",
     "rates.physics='1 ms'",
     "rates.control='2 ms'",
-    "sensors.rate.noise=0.01",
+    "sensors.rate.noise_std=0.01",
     "plant.gyrostat_inertia=[[15, 1, 1], [1, 12, 1], [1, 1, 18]]",
     "plant.wheels.torque_limit=5",
     "environment.torques=[{frame='body',bias=[1,2,3]}]",
@@ -85,9 +85,8 @@ def test_a_slow_law_has_a_frame_each_period(tmp_path: Path) -> None:
 
 
 def rows(log: Log, topic: str, kind: Any) -> Any:
-    """Return a topic's columns as a named tuple; what was not logged has no numbers."""
-    read = log.read(topic)
-    return kind(*(read.get(name, np.zeros((len(log), 0))) for name in kind._fields))
+    """Return a topic's columns as a ``Measurement`` or a ``Reference``."""
+    return kind(**{name: values for name, values in log.read(topic).items() if name != "time"})
 
 
 def test_measurement_and_command_are_what_the_law_saw_and_said(log: Log, built: Assembly) -> None:
@@ -97,13 +96,12 @@ def test_measurement_and_command_are_what_the_law_saw_and_said(log: Log, built: 
     command, signals = log.read("/command"), log.read("/law")
     time = state["time"]
     names = [name.removeprefix("law_") for name in state if name.startswith("law_")]
-    begin = built.law.reset(_row(seen, 0), _row(wanted, 0, axis=False))
+    begin = built.law.reset(seen._map(lambda a: a[:1]), _row(wanted, 0))
     assert sorted(begin._fields) == sorted(names)
     for k in range(len(time) - 1):
         before = type(begin)(*(state[f"law_{name}"][k][None] for name in begin._fields))
-        after, said, shown = built.law.step(
-            before, time[k], _row(seen, k), _row(wanted, k, axis=False)
-        )
+        measured = seen._map(lambda a, k=k: a[k][None])
+        after, said, shown = built.law.step(before, time[k], measured, _row(wanted, k))
         np.testing.assert_array_equal(said.torque[0], command["torque"][k])
         for name, value in shown._asdict().items():
             np.testing.assert_array_equal(np.ravel(value), np.ravel(signals[name][k]), name)
@@ -111,8 +109,8 @@ def test_measurement_and_command_are_what_the_law_saw_and_said(log: Log, built: 
             np.testing.assert_array_equal(value[0], state[f"law_{name}"][k + 1], name)
 
 
-def _row(fields: Any, k: int, axis: bool = True) -> Any:
-    return type(fields)(*(a[k][None] if axis else a[k] for a in fields))
+def _row(fields: Any, k: int) -> Any:
+    return type(fields)(*(a[k] for a in fields))
 
 
 def test_truth_reference_and_disturbance_have_their_own_sources(log: Log, built: Assembly) -> None:

@@ -36,7 +36,7 @@ pytestmark = pytest.mark.filterwarnings(
 NOISY = (
     "duration=0.4",
     "seed=7",
-    "sensors.rate.noise=0.01",
+    "sensors.rate.noise_std=0.01",
     "sensors.attitude.period='4 ms'",
     "sensors.attitude.delay='8 ms'",
     "plant.wheels.torque_limit=5",
@@ -135,7 +135,7 @@ def changed_log(log: Log, out: Path, topic: str, field: str, number: int, *, dig
 
 EVERYTHING = (
     "duration=0.05",
-    "sensors.rate.noise=0.01",
+    "sensors.rate.noise_std=0.01",
     "sensors.rate.bias_walk=0.01",
     "faults=[{motor='wheel_0', kind='delayed', value='2 ms', at=0.01}]",
 )
@@ -271,7 +271,8 @@ def test_a_law_is_reset_with_what_was_measured_and_desired_there(
         next(fly(built, first_start(built, [0])))
         start = start_of(noisy.log, built, 0.25)
         (first, _), (measurement, reference) = asked
-        assert [np.shape(a) for a in measurement] == [np.shape(a) for a in first]
+        shapes = {name: np.shape(a) for name, a in measurement._asdict().items()}
+        assert shapes == {name: np.shape(a) for name, a in first._asdict().items()}
         rate = noisy.log.nearest("/measurement", 0.25)["rate"]
         np.testing.assert_array_equal(measurement.rate[0], rate)
         desired = built.reference.at(np.array([0.25]))

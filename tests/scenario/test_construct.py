@@ -183,8 +183,7 @@ def test_a_law_of_ones_own_is_flown_one_by_one(tmp_path: Path) -> None:
     assert flown.gains == {"control_period": 0.01, "gain": 3.0}
     wrapped = UnbatchedLaw(law)
     rate = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    absent = [np.zeros((2, 0))] * (len(Measurement._fields) - 2)
-    seen = Measurement(np.tile([1.0, 0, 0, 0], (2, 1)), rate, *absent)
+    seen = Measurement(attitude=np.tile([1.0, 0, 0, 0], (2, 1)), rate=rate)
     still = Reference(np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
     state = wrapped.reset(seen, still)
     state, command, signals = wrapped.step(state, 0.0, seen, still)

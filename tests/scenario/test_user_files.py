@@ -96,7 +96,9 @@ def test_two_folders_do_not_answer_for_one_another(tmp_path: Path) -> None:
     for name, sign in (("a", -1.0), ("b", 1.0)):
         write(tmp_path / name, "+" if sign > 0.0 else "-")
         damper = load_object("damper.py:Damper", tmp_path / name)
-        seen = Measurement(np.zeros(4), np.array([0.1, 0.0, 0.0]), np.zeros(3))
+        seen = Measurement(
+            attitude=np.zeros(4), rate=np.array([0.1, 0.0, 0.0]), wheel_speed=np.zeros(3)
+        )
         _, command, _ = damper().step(None, 0.0, seen, None)
         assert command.torque[0] == pytest.approx(sign * 0.1)
     assert sys.path == before[1]

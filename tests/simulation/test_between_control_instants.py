@@ -253,7 +253,10 @@ class Inner:
 def test_an_inner_loop_sees_the_sensors_and_not_the_truth(tmp_path: Path) -> None:
     path = satellite(tmp_path, "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]")
     (tmp_path / "noisy.py").write_text(NOISY)
-    sensor = ["sensors.rate={noise='0.01 rad/s', period='20 ms'}", "law={kind='noisy.py:Inner'}"]
+    sensor = [
+        "sensors.rate={noise_std='0.01 rad/s', period='20 ms'}",
+        "law={kind='noisy.py:Inner'}",
+    ]
     rows, _ = flown(assemble(*load(path, [*sensor, "duration=1", "rates.control='0.1 s'"])))
     # The state is what the inner loop was shown last, in the step before: the newest sample.
     shown = rows["/state"]["law_reading"][1:]

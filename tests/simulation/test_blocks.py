@@ -19,7 +19,7 @@ from mjspace.simulation.loop import fly
 EVENTFUL = [
     "duration=0.6",
     "checks=[]",
-    "sensors.rate={noise=1e-5,bias_walk=1e-6}",
+    "sensors.rate={noise_std=1e-5,bias_walk=1e-6}",
     "plant.wheels.torque_limit=1.6",  # wheel 0 is cut from the start for 0.2 s, then free
     "events=[{name='slow',signal='truth.rate[0]',below=0.265},"
     "{name='noisy',signal='measurement.rate[1]',above=-0.15,level='WARNING'}]",

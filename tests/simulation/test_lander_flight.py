@@ -90,7 +90,7 @@ def test_a_rigid_lander_flies_as_the_oracle_says() -> None:
             data.qvel[None, 3:],
         )
         off.append(np.linalg.norm(place - wanted.position[k] - [0.0, 0.0, reference.stance]))
-        seen = Measurement(q, w, none, position=place, velocity=v)
+        seen = Measurement(attitude=q, rate=w, wheel_speed=none, position=place, velocity=v)
         now = Trajectory(*(part[k] for part in motion))
         state = law.reset(seen, now) if state is None else state
         state, command, _ = law.step(state, time[k], seen, now)
@@ -155,7 +155,7 @@ def test_it_burns_what_it_weighs() -> None:
 
 
 def test_alone_or_in_a_batch_it_lands_the_same_to_the_bit() -> None:
-    noisy = (*SHORT, "sensors.position.noise=0.3", "sensors.velocity.noise=0.1")
+    noisy = (*SHORT, "sensors.position.noise_std=0.3", "sensors.velocity.noise_std=0.1")
     assembly = built("lander", *noisy)
     together = flown(assembly, members=(4, 7, 1), threads=2)
     alone = flown(assembly, members=(7,))

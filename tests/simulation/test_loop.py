@@ -23,9 +23,9 @@ pytestmark = pytest.mark.filterwarnings(
 )
 
 NOISY = [
-    "sensors.rate.noise=0.01",
+    "sensors.rate.noise_std=0.01",
     "sensors.rate.bias_walk=0.001",
-    "sensors.attitude.noise=1e-4",
+    "sensors.attitude.noise_std=1e-4",
     "sensors.attitude.period='4 ms'",
     "sensors.attitude.delay='8 ms'",
     "plant.wheels.torque_limit=5",

@@ -106,7 +106,7 @@ def test_a_law_cannot_write_into_what_it_receives(tmp_path: Path, write: str, ba
         flown(tmp_path, law(f"{write}; {GOOD}"), f"law.batched={batched}")
 
 
-@pytest.mark.parametrize("sensor", ["sensors.rate.noise=1e-3", "sensors.rate.delay='10 ms'"])
+@pytest.mark.parametrize("sensor", ["sensors.rate.noise_std=1e-3", "sensors.rate.delay='10 ms'"])
 def test_nor_into_what_a_sensor_that_is_not_ideal_reports(tmp_path: Path, sensor: str) -> None:
     with pytest.raises(FlightError, match="read-only"):
         flown(tmp_path, law(f"m.rate[...] = 0.0; {GOOD}"), sensor, "law.batched=true")
@@ -409,6 +409,18 @@ class Source:
     )
     with pytest.raises(FlightError, match=message):
         flown(tmp_path, code)
+
+
+@pytest.mark.parametrize("batched", ["true", "false"])
+def test_reading_what_no_sensor_measures_names_the_sensor(tmp_path: Path, batched: str) -> None:
+    code, chosen = law(f"m.position; {GOOD}"), f"law.batched={batched}"
+    line = 1 + (HEAD + code[: code.index("m.position")]).count("\n")
+    with pytest.raises(FlightError) as caught:
+        flown(tmp_path, code, chosen)
+    message = str(caught.value)
+    assert f"own.py:{line}: no sensor measures position: add [sensors.position]" in message
+    assert "\n" not in message
+    flown(tmp_path, code, chosen, "sensors.position={}")
 
 
 def test_a_disturbance_knows_its_surroundings_whatever_the_sensors(tmp_path: Path) -> None:

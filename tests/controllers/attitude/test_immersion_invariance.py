@@ -157,7 +157,9 @@ def test_printed_momentum_leaves_an_error() -> None:
 def test_margin_to_the_singularity_is_reported(pitch: float) -> None:
     law = ImmersionInvariance(H, AXES, JW)
     seen = Measurement(
-        att.from_euler_zyx(np.array([[0.3, pitch, 0.2]])), np.zeros((1, 3)), np.zeros((1, 3))
+        attitude=att.from_euler_zyx(np.array([[0.3, pitch, 0.2]])),
+        rate=np.zeros((1, 3)),
+        wheel_speed=np.zeros((1, 3)),
     )
     reference = Reference(*(part[0] for part in EulerSinusoids().at(np.zeros(1))))
     _, _, signals = law.step(law.reset(seen, reference), 0.0, seen, reference)

@@ -142,7 +142,9 @@ def continuous(
 
     def slope(t: float, y: Array) -> Array:
         q, w, speed = y[:4], y[4:7], y[7:]
-        _, command, _ = law.step(law.reset(None, None), t, Measurement(q, w, speed), wanted(t))
+        _, command, _ = law.step(
+            law.reset(None, None), t, Measurement(attitude=q, rate=w, wheel_speed=speed), wanted(t)
+        )
         motor = share @ command.torque
         whole = inertia @ w + axes.T @ (Jw * (axes @ w + speed))
         dw = np.linalg.solve(inertia, np.cross(whole, w) - axes.T @ motor + M)

@@ -5,6 +5,7 @@ the law is sampled. Times were read from samples 0.05 s apart, the last one abov
 """
 
 from functools import cache
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,7 +91,9 @@ def fly(law: Any, duration: float, period: float, disturbed: bool = False) -> Fl
     attitude, sigma_e, torque = np.empty((rows, 4)), np.empty((rows, 3)), np.empty((rows, 3))
     for k in range(rows):
         reference = Reference(wanted.attitude[k], wanted.rate[k], wanted.acceleration[k])
-        _, command, shown = law.step(State(), time[k], Measurement(y[:4], y[4:], none), reference)
+        _, command, shown = law.step(
+            State(), time[k], Measurement(attitude=y[:4], rate=y[4:], wheel_speed=none), reference
+        )
         attitude[k], sigma_e[k], torque[k] = y[:4], shown.sigma_e, command.torque
         y = advance(y, torque[k], push[k], period, M, solve)
     error = np.degrees(att.rotation_angle(attitude, wanted.attitude))
@@ -145,7 +148,7 @@ def readings(count: int) -> tuple[Measurement, Reference]:
     attitude = att.normalize(rng.normal(size=(count, 4)))
     rate = rng.normal(size=(count, 3))
     wanted = Reference(att.normalize(rng.normal(size=4)), *rng.normal(size=(2, 3)))
-    return Measurement(attitude, rate, np.zeros((count, 0))), wanted
+    return Measurement(attitude=attitude, rate=rate, wheel_speed=np.zeros((count, 0))), wanted
 
 
 def composed(sigma: Array, sigma_d: Array, sign: float) -> Array:
@@ -180,7 +183,9 @@ def torque_at(attitude: Array, rate: Array, momentum: Array, sigma_d: Array) -> 
 def test_on_the_wanted_motion_the_torque_is_what_the_motion_takes(law: Any) -> None:
     _, wanted = readings(1)
     w, a = wanted.rate, wanted.acceleration
-    _, command, shown = law.step(State(), 0.0, Measurement(wanted.attitude, w, np.zeros(0)), wanted)
+    _, command, shown = law.step(
+        State(), 0.0, Measurement(attitude=wanted.attitude, rate=w, wheel_speed=np.zeros(0)), wanted
+    )
     np.testing.assert_allclose(command.torque, M @ a + np.cross(w, M @ w), atol=1e-12)
     np.testing.assert_allclose(np.stack(shown[:2]), 0.0, atol=1e-15)
 
@@ -265,7 +270,7 @@ def test_either_sign_of_either_quaternion(law: Any) -> None:
 def test_350_degrees_away_is_10_degrees_away(law: Any) -> None:
     still = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
     attitude = att.from_rotation_vector(np.radians([[0.0, 0.0, 350.0], [0.0, 0.0, -10.0]]))
-    seen = Measurement(attitude, np.zeros((2, 3)), np.zeros((2, 0)))
+    seen = Measurement(attitude=attitude, rate=np.zeros((2, 3)), wheel_speed=np.zeros((2, 0)))
     _, command, shown = law.step(State(), 0.0, seen, still)
     one, other = command.torque
     assert one[2] > 0.0  # forward, over the 10 deg that are left
@@ -276,15 +281,15 @@ def test_350_degrees_away_is_10_degrees_away(law: Any) -> None:
 @laws
 def test_a_step_changes_nothing_and_is_the_same_alone_and_in_a_batch(law: Any) -> None:
     seen, wanted = readings(64)
-    for array in (*seen, *wanted):
+    for array in (*seen._asdict().values(), *wanted):
         array.flags.writeable = False
     _, command, shown = law.step(law.reset(seen, wanted), 0.0, seen, wanted)
     for i in range(64):
-        lone = Measurement(*(part[i] for part in seen[:3]))
+        lone = seen._map(itemgetter(i))
         _, command_i, shown_i = law.step(law.reset(lone, wanted), 0.0, lone, wanted)
         parts = zip((*command, *shown), (*command_i, *shown_i), strict=True)
         assert all(np.array_equal(many[i], one) for many, one in parts)
-    shaped = Measurement(*(part.reshape(4, 16, -1) for part in seen[:3]))
+    shaped = seen._map(lambda part: part.reshape(4, 16, -1))
     _, folded, _ = law.step(law.reset(shaped, wanted), 0.0, shaped, wanted)
     assert np.array_equal(folded.torque.reshape(64, 3), command.torque)
 

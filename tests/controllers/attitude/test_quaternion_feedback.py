@@ -87,7 +87,10 @@ def test_the_sign_of_the_scalar_takes_the_shorter_way(q0: Array) -> None:
 def test_a_sensor_may_report_either_sign_once_it_has_begun(kind: Any) -> None:
     feedback, wanted = law(kind), at_rest()
     turns = (200.0, 190.0, 175.0, 160.0)
-    seen = [Measurement(turned(angle), 0.1 * AXIS, np.zeros(3)) for angle in turns]
+    seen = [
+        Measurement(attitude=turned(angle), rate=0.1 * AXIS, wheel_speed=np.zeros(3))
+        for angle in turns
+    ]
     one = other = feedback.reset(seen[0], wanted)
     for k, sample in enumerate(seen):
         flipped = sample._replace(attitude=(-1.0) ** k * sample.attitude)
@@ -150,7 +153,7 @@ def test_hysteresis_keeps_the_sign_in_the_noise() -> None:
         signs = []
         for _ in range(400):
             noisy = att.normalize(np.array([0.0, 1.0, 0.0, 0.0]) + 5e-3 * rng.normal(size=4))
-            seen, wanted = Measurement(noisy, STILL, STILL), at_rest()
+            seen, wanted = Measurement(attitude=noisy, rate=STILL, wheel_speed=STILL), at_rest()
             state = switched.reset(seen, wanted) if state is None else state
             state, _, signals = switched.step(state, 0.0, seen, wanted)
             signs.append(signals.k[0])
@@ -163,7 +166,7 @@ def test_the_sign_changes_past_the_hysteresis() -> None:
     switched = law(Switched)
     state = State(turned(10.0), np.ones(1), np.zeros(1), np.zeros(1))
     for degrees, k in ((170.0, 1.0), (185.0, 1.0), (186.0, -1.0), (175.0, -1.0), (174.0, 1.0)):
-        seen = Measurement(turned(degrees), STILL, STILL)
+        seen = Measurement(attitude=turned(degrees), rate=STILL, wheel_speed=STILL)
         state, _, signals = switched.step(state, 0.0, seen, at_rest())
         assert signals.k[0] == k  # asin 0.05 is 5.7 deg of 360
 
@@ -187,7 +190,11 @@ def test_rate_damping_stops_the_tumble_and_no_more() -> None:
 
 
 def test_the_wheels_give_their_gyroscopic_torque_too() -> None:
-    seen = Measurement(turned(0.0), np.array([0.1, 0.2, -0.1]), np.array([20.0, -40.0, 60.0]))
+    seen = Measurement(
+        attitude=turned(0.0),
+        rate=np.array([0.1, 0.2, -0.1]),
+        wheel_speed=np.array([20.0, -40.0, 60.0]),
+    )
     damper = law(RateDamping)
     _, command, signals = damper.step(damper.reset(seen, at_rest()), 0.0, seen, at_rest())
     h = JW * (seen.rate + seen.wheel_speed)

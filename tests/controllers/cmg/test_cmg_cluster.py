@@ -1,5 +1,6 @@
 """Single-gimbal CMGs: their steering against the momentum that it steers, and the law on it."""
 
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,13 @@ def seen(count: int) -> Measurement:
     rng = np.random.default_rng(5)
     q = att.normalize(rng.normal(size=(count, 4)))
     angle, rate = rng.uniform(-3.0, 3.0, (count, 4)), 0.2 * rng.normal(size=(count, 3))
-    return Measurement(q, rate, 500.0 + rng.normal(size=(count, 4)), angle, 0.0 * angle)
+    return Measurement(
+        attitude=q,
+        rate=rate,
+        wheel_speed=500.0 + rng.normal(size=(count, 4)),
+        gimbal_angle=angle,
+        gimbal_rate=0.0 * angle,
+    )
 
 
 def test_the_torque_is_the_momentum_lost() -> None:
@@ -156,12 +163,12 @@ def test_the_space_station_of_the_lecture() -> None:
 
 def test_alone_and_in_a_batch_the_same_bits_and_nothing_is_changed() -> None:
     flown, many = law(null_gain=0.3, gimbal_rate_limit=0.5), seen(16)
-    for array in many:
+    for array in many._asdict().values():
         array.flags.writeable = False
     _, command, signals = flown.step(flown.reset(many, AT_REST), 0.7, many, AT_REST)
     assert command.gimbal_rate.shape == (16, 4)
     for i in range(16):
-        one = Measurement(*(a[i] if a.size else a for a in many))
+        one = many._map(itemgetter(i))
         _, alone, shown = flown.step(flown.reset(one, AT_REST), 0.7, one, AT_REST)
         np.testing.assert_array_equal(alone.gimbal_rate, command.gimbal_rate[i])
         for a, b in zip(shown, signals, strict=True):
@@ -192,7 +199,13 @@ def test_its_torque_carries_the_wheels_round() -> None:
     flown, angle = law(), np.radians([20.0, 40.0, -10.0, 30.0])
     rate = np.array([0.1, -0.05, 0.2])
     moving = AT_REST._replace(rate=rate)
-    turning = Measurement(AT_REST.attitude, rate, SPEED, angle, 0.0 * angle)
+    turning = Measurement(
+        attitude=AT_REST.attitude,
+        rate=rate,
+        wheel_speed=SPEED,
+        gimbal_angle=angle,
+        gimbal_rate=0.0 * angle,
+    )
     _, _, signals = flown.step(flown.reset(turning, moving), 0.0, turning, moving)
     whole = flown.inertia @ rate + momentum(PYRAMID, angle, SPEED)
     np.testing.assert_allclose(signals.torque, np.cross(rate, whole), atol=1e-14)

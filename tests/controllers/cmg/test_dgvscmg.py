@@ -23,12 +23,12 @@ def seen(vehicles: int, seed: int = 0) -> Measurement:
     random = np.random.default_rng(seed)
     q = random.normal(size=(vehicles, 4))
     return Measurement(
-        q / np.linalg.norm(q, axis=1, keepdims=True),
-        0.1 * random.normal(size=(vehicles, 3)),
-        80.0 + random.normal(size=(vehicles, 1)),
-        0.3 * random.normal(size=(vehicles, 2)),
-        random.normal(size=(vehicles, 2)),
-        random.normal(size=(vehicles, 3, 2)),
+        attitude=q / np.linalg.norm(q, axis=1, keepdims=True),
+        rate=0.1 * random.normal(size=(vehicles, 3)),
+        wheel_speed=80.0 + random.normal(size=(vehicles, 1)),
+        gimbal_angle=0.3 * random.normal(size=(vehicles, 2)),
+        gimbal_rate=random.normal(size=(vehicles, 2)),
+        current=random.normal(size=(vehicles, 3, 2)),
     )
 
 
@@ -64,7 +64,14 @@ def test_both_quaternions_are_one_attitude() -> None:
 def test_nothing_is_asked_of_a_satellite_that_is_where_it_should_be() -> None:
     q = np.array([[1.0, 0.0, 0.0, 0.0]])
     none = np.zeros((1, 2))
-    still = Measurement(q, np.zeros((1, 3)), np.full((1, 1), 73.0), none, none, np.zeros((1, 3, 2)))
+    still = Measurement(
+        attitude=q,
+        rate=np.zeros((1, 3)),
+        wheel_speed=np.full((1, 1), 73.0),
+        gimbal_angle=none,
+        gimbal_rate=none,
+        current=np.zeros((1, 3, 2)),
+    )
     _, command, signals, voltage = flown(cascade(), still)
     for asked in (*command, signals.sigma_e, signals.s, signals.torque, signals.speed_error):
         np.testing.assert_allclose(asked, 0.0, atol=1e-15)

@@ -1,5 +1,6 @@
 """The thesis' actuator: its motors by an independent integration, its torque by the momentum."""
 
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,14 @@ def seen(vehicles: int) -> Measurement:
     attitude = rng.normal(size=(vehicles, 4))
     attitude /= np.linalg.norm(attitude, axis=-1, keepdims=True)
     none = np.zeros((vehicles, 0))
-    return Measurement(attitude, 0.1 * rng.normal(size=(vehicles, 3)), none, none, none, none)
+    return Measurement(
+        attitude=attitude,
+        rate=0.1 * rng.normal(size=(vehicles, 3)),
+        wheel_speed=none,
+        gimbal_angle=none,
+        gimbal_rate=none,
+        current=none,
+    )
 
 
 def wanted() -> Reference:
@@ -69,7 +77,15 @@ def test_the_bus_gets_what_the_wheel_s_momentum_loses() -> None:
 
 def test_a_motor_turns_under_its_current_and_the_vibration() -> None:
     """With no loop at work but the smallest: J W' = 0.35 cos(theta / 2 + 3), by another program."""
-    still = Measurement(np.array([[1.0, 0, 0, 0]]), np.zeros((1, 3)), *[np.zeros((1, 0))] * 4)
+    none = np.zeros((1, 0))
+    still = Measurement(
+        attitude=np.array([[1.0, 0, 0, 0]]),
+        rate=np.zeros((1, 3)),
+        wheel_speed=none,
+        gimbal_angle=none,
+        gimbal_rate=none,
+        current=none,
+    )
     at_rest = Reference(np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
     free = law(speed_gain=np.full(3, 1e-12), observer_gain=np.zeros(3), vibration_gain=np.zeros(3))
     state = free.reset(still, at_rest)
@@ -109,7 +125,7 @@ def test_a_vehicle_is_the_same_alone_and_in_a_batch() -> None:
     many = seen(5)
     batch = flown(law(), many, 3)[-1]
     for index in range(5):
-        one = Measurement(*(field[index : index + 1] for field in many))
+        one = many._map(itemgetter(slice(index, index + 1)))
         alone = flown(law(), one, 3)[-1]
         np.testing.assert_array_equal(alone[1][0], batch[1][index])
         for a, b in zip(alone[0], batch[0], strict=True):

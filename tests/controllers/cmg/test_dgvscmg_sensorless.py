@@ -23,12 +23,12 @@ def seen(vehicles: int) -> Measurement:
     random = np.random.default_rng(0)
     q = random.normal(size=(vehicles, 4))
     return Measurement(
-        q / np.linalg.norm(q, axis=1, keepdims=True),
-        0.1 * random.normal(size=(vehicles, 3)),
-        73.0 + random.normal(size=(vehicles, 1)),
-        0.3 * random.normal(size=(vehicles, 2)),
-        random.normal(size=(vehicles, 2)),
-        random.normal(size=(vehicles, 3, 2)),
+        attitude=q / np.linalg.norm(q, axis=1, keepdims=True),
+        rate=0.1 * random.normal(size=(vehicles, 3)),
+        wheel_speed=73.0 + random.normal(size=(vehicles, 1)),
+        gimbal_angle=0.3 * random.normal(size=(vehicles, 2)),
+        gimbal_rate=random.normal(size=(vehicles, 2)),
+        current=random.normal(size=(vehicles, 3, 2)),
     )
 
 

@@ -101,7 +101,7 @@ def test_the_thrust_follows_the_mass_that_the_tank_shows(axes: tuple[int, ...]) 
     thrusts = []
     for left in (20.0, 10.0):
         seen = Measurement(
-            upright, still, none, position=still, velocity=still,
+            attitude=upright, rate=still, wheel_speed=none, position=still, velocity=still,
             propellant=np.full((*axes, 1), left),
         )  # fmt: skip
         _, command, _ = law.step(law.reset(seen, wanted), 0.0, seen, wanted)

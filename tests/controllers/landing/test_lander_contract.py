@@ -29,14 +29,14 @@ def readings(count: int, rows: int) -> list[Measurement]:
     for _ in range(rows):
         tilt = att.from_rotation_vector(rng.normal(0.0, 0.2, (count, 3)))
         seen = Measurement(
-            att.multiply(att.from_rotation_vector(np.array([0.0, 0.0, 0.6435])), tilt),
-            rng.normal(0.0, 0.05, (count, 3)),
-            np.zeros((count, 0)),
+            attitude=att.multiply(att.from_rotation_vector(np.array([0.0, 0.0, 0.6435])), tilt),
+            rate=rng.normal(0.0, 0.05, (count, 3)),
+            wheel_speed=np.zeros((count, 0)),
             position=rng.normal((2000.0, 1500.0, 1000.0), 20.0, (count, 3)),
             velocity=rng.normal((-19.0, -14.0, -10.0), 2.0, (count, 3)),
             contact=np.zeros((count, 1)),
         )
-        for array in seen:
+        for array in seen._asdict().values():
             array.flags.writeable = False
         found.append(seen)
     return found
@@ -50,8 +50,7 @@ def wanted(source: Any, rows: int) -> list[Trajectory]:
 
 
 def of(seen: Measurement, rows: slice, lead: tuple[int, ...] = (1,)) -> Measurement:
-    cut = (a[rows] if len(a) else np.zeros((len(seen.rate[rows]), 0)) for a in seen)
-    return Measurement(*(a.reshape(*lead, a.shape[-1]) for a in cut))
+    return seen._map(lambda a: a[rows].reshape(*lead, a.shape[-1]))
 
 
 def fields(result: tuple[Any, ...]) -> list[Array]:
@@ -71,7 +70,9 @@ def test_alone_and_in_a_batch_are_the_same_bits(law: Any, source: Any) -> None:
             assert np.array_equal(one, other)
             assert one.shape[0] == 16
             assert one.ndim == 2
-            assert not any(np.shares_memory(one, given) for given in (*state, *flight[k]))
+            assert not any(
+                np.shares_memory(one, given) for given in (*state, *flight[k]._asdict().values())
+            )
         for i in range(16):
             rows = slice(i, i + 1)
             alone = law.step(lone[i], 0.02 * k, of(flight[k], rows), reference[k])

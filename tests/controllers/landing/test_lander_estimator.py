@@ -1,6 +1,7 @@
 """The lander's filter: consistent with its own covariance, and good enough to land on."""
 
 from collections.abc import Iterator
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,13 @@ def descent(source: Any, rows: int) -> Iterator[Measurement]:
     """Yield the truth of a vehicle that follows ``source``."""
     wanted = source.at(PERIOD * np.arange(rows))
     for q, w, p, v in zip(wanted.attitude, wanted.rate, wanted.position, wanted.velocity):  # noqa: B905
-        yield Measurement(q[None], w[None], np.zeros((1, 0)), position=p[None], velocity=v[None])
+        yield Measurement(
+            attitude=q[None],
+            rate=w[None],
+            wheel_speed=np.zeros((1, 0)),
+            position=p[None],
+            velocity=v[None],
+        )
 
 
 def errors(estimate: FilterState, truth: Measurement, sensors: Sensors) -> Array:
@@ -124,7 +131,7 @@ def test_alone_and_in_a_batch_are_the_same_bits() -> None:
         seen = seen._replace(wheel_speed=np.zeros((4, 0)))
         together = FILTER.navigate(together or FILTER.fix(seen), seen)
         for i in range(4):
-            own = Measurement(*(a[i : i + 1] if a.ndim > 1 else a for a in seen))
+            own = seen._map(itemgetter(slice(i, i + 1)))
             alone[i] = FILTER.navigate(alone[i] or FILTER.fix(own), own)
             for one, other in zip(together, alone[i], strict=True):
                 assert np.array_equal(one[i : i + 1], other)
@@ -166,6 +173,8 @@ def test_it_lands_on_its_estimates(law: Any, source: Any, duration: float) -> No
 
 def test_a_missing_sensor_is_named() -> None:
     sensors = Sensors(FILTER, 1, 4)
-    seen = sensors(next(descent(SineDescent(), 1)))._replace(altitude=np.zeros((1, 0)))
-    with pytest.raises(ValueError, match="no altitude is measured"):
-        FILTER.fix(seen)
+    measured = sensors(next(descent(SineDescent(), 1)))._asdict()
+    del measured["altitude"]
+    belief = FILTER.fix(Measurement(**measured))
+    with pytest.raises(AttributeError, match=r"no sensor measures altitude: add \[sensors\.alt"):
+        FILTER.navigate(belief, Measurement(**measured))

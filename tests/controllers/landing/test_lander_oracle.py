@@ -56,7 +56,9 @@ def test_vectoring_gets_the_angular_acceleration_that_it_asks_for() -> None:
     now = Trajectory(*(part[0] for part in wanted))
     tilt = att.from_rotation_vector(np.array([0.05, -0.02, 0.3]))
     q, w = att.multiply(now.attitude, tilt), np.array([0.05, -0.04, 0.8])
-    seen = Measurement(q, w, np.zeros(0), position=now.position, velocity=now.velocity)
+    seen = Measurement(
+        attitude=q, rate=w, wheel_speed=np.zeros(0), position=now.position, velocity=now.velocity
+    )
     _, command, signals = law.step(law.reset(seen, now), 30.0, seen, now)
     paper = [2, 0, 1]  # our z, x, y
     place = [*now.position[paper], *now.velocity[paper], q[0], *q[1:][paper], *w[paper]]
@@ -81,7 +83,9 @@ def test_vectoring_asks_for_no_more_than_its_limit(error: float) -> None:
     now = Trajectory(*(part[0] for part in wanted))
     upright, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     place = now.position + np.array([0.0, 0.0, error])
-    seen = Measurement(upright, still, np.zeros(0), position=place, velocity=still)
+    seen = Measurement(
+        attitude=upright, rate=still, wheel_speed=np.zeros(0), position=place, velocity=still
+    )
     _, _, signals = law.step(law.reset(seen, now), 200.0, seen, now)
     needed = 100.0 * (MU / (MOON_RADIUS + place[2]) ** 2 + now.linear_acceleration[2])
     assert signals.wanted_thrust[0] - needed == pytest.approx(-30.0 * np.sign(error), abs=1e-6)

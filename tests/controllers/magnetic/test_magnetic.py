@@ -1,5 +1,7 @@
 """Laws that use the Earth's field: what they take from a tumble and from wheels, and what not."""
 
+from operator import itemgetter
+
 import numpy as np
 import pytest
 from mjspace.controllers.attitude.linear_quadratic import Regulator
@@ -17,11 +19,9 @@ FIELD = np.array([2e-5, -3e-5, 1e-5])
 def readings(count: int = 5) -> Measurement:
     rng = np.random.default_rng(4)
     turned = attitude.from_rotation_vector(0.02 * rng.normal(size=(count, 3)))
-    every = dict.fromkeys(Measurement._fields, np.zeros((count, 0)))
     fields = FIELD * rng.uniform(0.5, 1.5, size=(count, 3))
     rate, speed = 0.01 * rng.normal(size=(count, 3)), 100.0 * rng.normal(size=(count, 3))
-    shown = {"attitude": turned, "rate": rate, "wheel_speed": speed, "magnetic_field": fields}
-    return Measurement(**every | shown)
+    return Measurement(attitude=turned, rate=rate, wheel_speed=speed, magnetic_field=fields)
 
 
 def test_b_dot_brakes_what_turns_across_the_field() -> None:
@@ -89,15 +89,15 @@ def test_thrusters_bring_an_exponential_decay(told: float) -> None:
 )
 def test_pure_and_alone_as_in_a_batch(law: BDot | MagneticUnloading | ThrusterUnloading) -> None:
     many = readings()
-    for array in many:
+    for array in many._asdict().values():
         array.flags.writeable = False
     state = law.reset(many, REST)
     (once, twice) = (law.step(state, 0.0, many, REST) for _ in range(2))
     for a, b in zip((*once[0], *once[1]), (*twice[0], *twice[1]), strict=True):
         np.testing.assert_array_equal(a, b)
-        assert not any(np.shares_memory(a, part) for part in many)
+        assert not any(np.shares_memory(a, part) for part in many._asdict().values())
     for i in range(5):
-        one = Measurement(*(part[i : i + 1] for part in many))
+        one = many._map(itemgetter(slice(i, i + 1)))
         _, command, _ = law.step(law.reset(one, REST), 0.0, one, REST)
         for a, b in zip(once[1], command, strict=True):
             np.testing.assert_array_equal(a[i], b[0])

@@ -10,7 +10,9 @@ from mjspace.contract import Measurement, Reference
 @pytest.mark.parametrize("batch", [(), (4,)])
 def test_no_torque(batch: tuple[int, ...]) -> None:
     shape = (*batch, 3)
-    seen = Measurement(np.ones((*batch, 4)), np.ones(shape), np.ones(shape))
+    seen = Measurement(
+        attitude=np.ones((*batch, 4)), rate=np.ones(shape), wheel_speed=np.ones(shape)
+    )
     wanted = Reference(np.ones(4), np.ones(3), np.ones(3))
     law = Coast()
     state, command, signals = law.step(law.reset(seen, wanted), 1.0, seen, wanted)

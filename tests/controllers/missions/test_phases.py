@@ -36,7 +36,7 @@ def built(table: Any = TABLE) -> tuple[Any, Component]:
 def seen(*rates: Any) -> Measurement:
     rows = np.array(rates, dtype=float)
     attitude = np.tile([0.8, 0.0, 0.6, 0.0], (len(rows), 1))
-    return Measurement(attitude, rows, np.ones((len(rows), 3)))
+    return Measurement(attitude=attitude, rate=rows, wheel_speed=np.ones((len(rows), 3)))
 
 
 def phase_of(state: Any) -> list[float]:
@@ -123,7 +123,7 @@ def test_the_table_as_flown_has_every_gain_of_every_law() -> None:
         ({"law": {"kind": "coast:Coat"}}, r"phases.0.law: 'coast' has no 'Coat': did you mean 'C"),
         ({"law": {"kind": "quaternion_feedback:RateDamping", "rate_gian": 1}}, "phases.0.law: rat"),
         ({"law": {"kind": "own.py:Law"}}, "phases.0.law: own.py:Law: a law within another comes"),
-        ({"until": {"signal": "rat", "below": 1}}, "phases.0: until.signal: got 'rat', should be"),
+        ({"until": {"signal": "rate[x]", "below": 1}}, r"phases.0: until.signal: got 'rate\[x\]'"),
         ({"until": {"signal": "rate"}}, "a signal and below or above go together"),
         ({"until": None}, "phases.0: 'damp' would never end: it needs an until"),
         ({"name": "wait"}, "phases: got .*, should be one or more, with different names"),

@@ -334,7 +334,9 @@ def test_the_bench_law_is_its_loops() -> None:
 
     def seen() -> Measurement:
         attitude, rate = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)), np.zeros((3, 3))
-        return Measurement(attitude, rate, speed[:, None].copy(), current=current)
+        return Measurement(
+            attitude=attitude, rate=rate, wheel_speed=speed[:, None].copy(), current=current
+        )
 
     state = law.reset(seen(), hold)
     for k in range(10000):

@@ -6,6 +6,7 @@ Measured: periods and amplitudes come out within 0.4 %: a relay is late by half 
 
 from collections.abc import Callable
 from math import cos, exp, radians, sin, sqrt
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ def law(kind: Callable[..., Any], period: float = 1e-3, **gains: Any) -> Any:
 
 def seen(angle: float, rate: float) -> Measurement:
     turned = np.array([cos(0.5 * angle), 0.0, sin(0.5 * angle), 0.0])
-    return Measurement(turned, np.array([0.0, rate, 0.0]), np.zeros(0))
+    return Measurement(attitude=turned, rate=np.array([0.0, rate, 0.0]), wheel_speed=np.zeros(0))
 
 
 def fly(
@@ -230,19 +231,21 @@ EVERY = [
 def test_a_batch_is_its_vehicles_and_a_step_changes_nothing(flown: Any) -> None:
     random = np.random.default_rng(5)
     turned = att.from_rotation_vector(random.uniform(-0.4, 0.4, (4, 3)))
-    many = Measurement(turned, random.uniform(0.0, 1e-3, (4, 3)), np.zeros((4, 0)))
-    for array in many:
+    many = Measurement(
+        attitude=turned, rate=random.uniform(0.0, 1e-3, (4, 3)), wheel_speed=np.zeros((4, 0))
+    )
+    for array in many._asdict().values():
         array.flags.writeable = False
     state = flown.reset(many, HOLD)
     for k in range(4):
-        other = Measurement(-many.attitude, many.rate, many.wheel_speed)
+        other = Measurement(attitude=-many.attitude, rate=many.rate, wheel_speed=many.wheel_speed)
         _, aim, signals = flown.step(state, 0.1 * k, many, HOLD)
         after, command = flown.inner(state, 0.1 * k, aim, many)
         np.testing.assert_array_equal(command.on_time, aim.on_time)
         _, same = flown.inner(state, 0.1 * k, aim, other)
         np.testing.assert_array_equal(command.on_time, same.on_time)
         for i in range(4):
-            one = Measurement(*(array[i] for array in many[:3]))
+            one = many._map(itemgetter(i))
             alone = State(state.memory[i])
             _, aim_of_one, shown = flown.step(alone, 0.1 * k, one, HOLD)
             _, pulses = flown.inner(alone, 0.1 * k, aim_of_one, one)
@@ -258,7 +261,9 @@ def test_a_turn_is_what_attitude_algebra_says() -> None:
     seen_, wanted = att.normalize(random.normal(size=(2, 50, 4)))
     rate, wanted_rate = random.normal(size=(2, 50, 3))
     angle, slip = turn(
-        Measurement(seen_, rate, NONE), Reference(wanted, wanted_rate, NONE), np.eye(3)
+        Measurement(attitude=seen_, rate=rate, wheel_speed=NONE),
+        Reference(wanted, wanted_rate, NONE),
+        np.eye(3),
     )
     error = att.multiply(att.conjugate(wanted), seen_)
     np.testing.assert_allclose(angle, att.to_rotation_vector(error), atol=1e-14)

@@ -1,5 +1,6 @@
 """The pulsed law: the torque of a gyroscopically exact PD, and pulses that give it on average."""
 
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ def wanted(time: float) -> Reference:
 def test_on_its_reference_the_torque_is_what_the_motion_needs() -> None:
     step = 1e-4
     before, now, after = (wanted(3.0 + k * step) for k in (-1, 0, 1))
-    seen = Measurement(now.attitude, now.rate, NOTHING)
+    seen = Measurement(attitude=now.attitude, rate=now.rate, wheel_speed=NOTHING)
     flown = law()
     _, _, signals = flown.step(flown.reset(seen, now), 0.0, seen, now)
     momenta = [att.rotate(ref.attitude, INERTIA @ ref.rate) for ref in (before, after)]
@@ -53,7 +54,10 @@ def test_the_wanted_acceleration_is_seen_from_the_turning_body() -> None:
         inertial = att.rotate(reference.attitude, reference.rate)
         seen_rates.append(att.rotate(att.conjugate(body), inertial))
     acceleration = (seen_rates[1] - seen_rates[0]) / (2.0 * step)
-    seen, flown = Measurement(attitude, rate, NOTHING), law(attitude_gain=0.0, rate_gain=0.0)
+    seen, flown = (
+        Measurement(attitude=attitude, rate=rate, wheel_speed=NOTHING),
+        law(attitude_gain=0.0, rate_gain=0.0),
+    )
     _, _, signals = flown.step(flown.reset(seen, wanted(3.0)), 0.0, seen, wanted(3.0))
     expected = INERTIA @ acceleration + np.cross(rate, INERTIA @ rate)
     np.testing.assert_allclose(signals.torque, expected, rtol=1e-6)
@@ -62,7 +66,9 @@ def test_the_wanted_acceleration_is_seen_from_the_turning_body() -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_it_turns_back_and_brakes(sign: float) -> None:
     turned = att.from_rotation_vector(np.array([0.2, -0.1, 0.3]))
-    seen = Measurement(sign * turned, np.array([0.01, 0.02, -0.01]), NOTHING)
+    seen = Measurement(
+        attitude=sign * turned, rate=np.array([0.01, 0.02, -0.01]), wheel_speed=NOTHING
+    )
     level = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
     flown = law()
     _, _, signals = flown.step(flown.reset(seen, level), 0.0, seen, level)
@@ -73,7 +79,7 @@ def test_it_turns_back_and_brakes(sign: float) -> None:
 
 def test_pulses_give_the_torque_on_average_and_no_push() -> None:
     turned = att.from_rotation_vector(np.array([0.1, -0.2, 0.15]))
-    seen = Measurement(turned, np.array([0.01, 0.0, -0.01]), NOTHING)
+    seen = Measurement(attitude=turned, rate=np.array([0.01, 0.0, -0.01]), wheel_speed=NOTHING)
     level = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
     flown = law(thruster_minimum_on=0.03)
     state, total = flown.reset(seen, level), np.zeros(12)
@@ -90,12 +96,14 @@ def test_pulses_give_the_torque_on_average_and_no_push() -> None:
 def test_a_batch_is_its_vehicles() -> None:
     random = np.random.default_rng(1)
     attitude = att.normalize(random.normal(size=(4, 4)))
-    seen = Measurement(attitude, random.normal(size=(4, 3)), np.zeros((4, 0)))
+    seen = Measurement(
+        attitude=attitude, rate=random.normal(size=(4, 3)), wheel_speed=np.zeros((4, 0))
+    )
     flown = law(thruster_minimum_on=0.02)
     state = State(random.uniform(0.0, 0.02, (4, 12)))
     after, command, signals = flown.step(state, 0.0, seen, wanted(1.0))
     for i in range(4):
-        one = Measurement(*(array[i] for array in seen[:3]))
+        one = seen._map(itemgetter(i))
         after_one, alone, shown = flown.step(State(state.carry[i]), 0.0, one, wanted(1.0))
         np.testing.assert_array_equal(after.carry[i], after_one.carry)
         np.testing.assert_array_equal(command.on_time[i], alone.on_time)
