@@ -1,6 +1,7 @@
 """Its presence puts this folder on the path: ``from oracle import fly`` works in every test."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,3 +28,31 @@ def pictured_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     folder = tmp_path_factory.mktemp("pictured")
     return run("contraction-adaptive", overrides=overrides, out=folder).path
+
+
+_FAILING_LAW = """
+from typing import NamedTuple
+import numpy as np
+
+class Command(NamedTuple):
+    torque: np.ndarray
+
+class Law:
+    def reset(self, measurement, reference):
+        return None
+
+    def step(self, state, time, measurement, reference):
+        if time > {time}:
+            raise ArithmeticError("no way on")
+        return None, Command(np.zeros(3)), ()
+"""
+
+
+@pytest.fixture
+def failing_law(tmp_path: Path) -> Callable[[float], None]:
+    """Write ``law.py`` with a class ``Law`` that commands no torque and raises after a time [s]."""
+
+    def write(time: float) -> None:
+        (tmp_path / "law.py").write_text(_FAILING_LAW.format(time=time))
+
+    return write

@@ -38,18 +38,18 @@ with 1.17 N m s in its wheel, the reaction wheels at rest.
 - **Torque.** A double gimbal amplifies nothing: its gimbals' motors bear the output torque, as
   reaction wheels' motors do, and for a moment more, when the manoeuvre begins at a step and the
   gimbals have to be set in motion.
-- **Mechanical energy.** Gimbals turn slowly, so that the same torque costs them little: they give
-  {gimbals:.1f} J where the three wheels' motors give {wheels:.0f} J. But the third axis of the CMG
-  is its wheel, which gets the torque along it at {slowest:.0f} to {fastest:.0f} rad/s:
-  {spin:.0f} J given and {back:.0f} J back. Rejecting the ripple moves another {ripple:.0f} J to
-  and fro, as the motor gives at that speed what the ripple takes.
+- **Mechanical energy.** Gimbals turn slowly, so that the same torque costs them little: they
+  deliver {gimbals:.1f} J where the three wheels' motors deliver {wheels:.0f} J. But the third axis
+  of the CMG is its wheel, which gets the torque along it at {slowest:.0f} to {fastest:.0f} rad/s:
+  {spin:.0f} J delivered and {back:.0f} J absorbed. Rejecting the ripple moves another
+  {ripple:.0f} J to and fro, as the motor delivers at that speed what the ripple absorbs.
 - **Copper loss** is R I^2 of the CMG's motors as flown. The reaction wheels have no electrical side
   in their scenario; theirs is what the CMG's wheel motor, k_m = {km:g} N m/A and R = {R:g} ohm,
   would lose for the same torques.
-- **Supply** is what is taken where no motor gives energy back: for each motor the positive part of
+- **Supply** is what is taken where no motor regenerates: for each motor the positive part of
   mechanical power and copper loss together.
 
-Bearing friction and drive electronics are in none of them. To write this page again:
+Bearing friction and drive electronics are not modelled. To write this page again:
 
     mjspace run dgvscmg-tracking --out runs/cmg
     mjspace run dgvscmg-tracking --set "plant.ripple={{}}" --out runs/quiet
@@ -80,7 +80,7 @@ class Flown:
 
     @property
     def supply(self) -> Array:
-        """Energy taken so far, none given back [J], (n,)."""
+        """Energy taken so far, without regeneration [J], (n,)."""
         taken = np.maximum(self.power + self.loss, 0.0).sum(axis=1)
         energy: Array = np.cumsum(taken) * (self.time[1] - self.time[0])
         return energy
@@ -136,7 +136,7 @@ def table(flights: Sequence[Flown]) -> str:
         "work done by the motors [J]": lambda f: f"{f.given():.1f}",
         "work done on the motors [J]": lambda f: f"{f.back():.1f}",
         "copper loss [J]": lambda f: f"{f.energy(f.loss):.1f}",
-        "supply, nothing given back [J]": lambda f: f"{f.supply[-1]:.0f}",
+        "supply, without regeneration [J]": lambda f: f"{f.supply[-1]:.0f}",
     }
     lines = ["| over 60 s | " + " | ".join(NAMES) + " |", "|---|" + "---|" * len(NAMES)]
     lines += [f"| {name} | {' | '.join(map(of, flights))} |" for name, of in rows.items()]

@@ -68,13 +68,13 @@ def _laws() -> list[str]:
                 gains = [_gain(f) for f in fields(kind)]
                 lines.append(f"| `{short}:{name}` | {', '.join(gains)} |")
     closing = """
-A gain without a default must be given, but for `inertia`, `wheel_axes`, `wheel_inertia`,
+A gain without a default must be set, but for `inertia`, `wheel_axes`, `wheel_inertia`,
 `control_period` and `inner_period` (the integration step): left out, they are those of the
 vehicle and the scenario as flown. Every number of a gain is finite but where `inf`, no limit, is in
 its range. Arrays may come from a CSV file: `file = "turn.csv"`, with a header that names the gains
 (`time,attitude0,attitude1,attitude2,attitude3`).
 
-A law in a file of one's own may import modules beside it, at the top of the file, and read data
+A law in a file of your own may import modules beside it, at the top of the file, and read data
 files beside it that it lists: `DATA_FILES = ("table.csv",)`, found from `Path(__file__).parent`.
 They all go into the log, from which the flight is replayed without the folder."""
     return [*lines, closing, ""]
@@ -82,8 +82,8 @@ They all go into the log, from which the flight is replayed without the folder."
 
 def _gain(field: Field[Any]) -> str:
     words = [field.metadata.get(key, "") for key in ("unit", "range", "form")]
-    told = ", ".join(str(word) for word in words if str(word)).replace("|", "\\|")
-    unit = f" ({told})" if told else ""
+    stated = ", ".join(str(word) for word in words if str(word)).replace("|", "\\|")
+    unit = f" ({stated})" if stated else ""
     if field.default_factory is not MISSING:
         return f"`{field.name}`{unit}: {field.default_factory().tolist()}"
     return f"`{field.name}`{unit}" + ("" if field.default is MISSING else f": {field.default}")

@@ -1,9 +1,9 @@
 """Attitude tracking by contraction analysis, known or estimated inertia: Servín 2022 (paper 002).
 
-The error is e = w - wd, where the wanted rate wd = 2 J(q)^T (qd' + lc qd) steers q to qd. All
+The error is e = w - wd, where the desired rate wd = 2 J(q)^T (qd' + lc qd) steers q to qd. All
 arrays may have leading vehicle axes. q and -q are one attitude: at reset each law takes the sign of
-q nearer to qd, and then keeps q's path continuous, so that none unwinds (erratum 10) and none minds
-which sign a sensor reports.
+q nearer to qd, and then keeps the path of q continuous. This avoids unwinding (erratum 10), and the
+sign that a sensor reports does not matter.
 """
 
 from dataclasses import dataclass
@@ -26,16 +26,16 @@ class IdealState(NamedTuple):
 
 
 class IdealSignals(NamedTuple):
-    """What the ideal law shows."""
+    """Signals of the ideal law."""
 
     e: Array
     """w - wd [rad/s], body axes, (..., 3)."""
     wd: Array
-    """Wanted rate [rad/s], body axes, (..., 3)."""
+    """Desired rate [rad/s], body axes, (..., 3)."""
 
 
 class GradientState(NamedTuple):
-    """Memory of the gradient law: as the ideal law's, and its estimates."""
+    """Memory of the gradient law: that of the ideal law, and the estimates."""
 
     attitude: Array
     theta_hat: Array
@@ -43,7 +43,7 @@ class GradientState(NamedTuple):
 
 
 class GradientSignals(NamedTuple):
-    """What the gradient law shows: as the ideal law, and the estimates it used."""
+    """Signals of the gradient law: those of the ideal law, and the estimates in use."""
 
     e: Array
     wd: Array
@@ -51,14 +51,14 @@ class GradientSignals(NamedTuple):
 
 
 class AdaptiveState(NamedTuple):
-    """Memory of the adaptive law: as the gradient law's, and what it has gathered."""
+    """Memory of the adaptive law: that of the gradient law, its information and its filters."""
 
     attitude: Array
     theta_hat: Array
     g: Array
-    """Z times the estimates' error, known without knowing the error, (..., 9)."""
+    """Z times the estimation error, computed without the true parameters, (..., 9)."""
     Z: Array
-    """Information gathered on the parameters, (..., 9, 9)."""
+    """Information matrix of the parameters, (..., 9, 9)."""
     w_f: Array
     """Filtered rate [rad/s], (..., 3)."""
     P_f: Array
@@ -68,7 +68,7 @@ class AdaptiveState(NamedTuple):
 
 
 class AdaptiveSignals(NamedTuple):
-    """What the adaptive law shows: as the gradient law, and its prediction error."""
+    """Signals of the adaptive law: those of the gradient law, and the prediction error."""
 
     e: Array
     wd: Array
@@ -81,8 +81,8 @@ class AdaptiveSignals(NamedTuple):
 class Ideal(Gains):
     """Known inertia: tau = H wd' - p x wd - Kc e, (3.6).
 
-    In place of the printed h = R^T hI, which needs a constant momentum, the tachometers give
-    p = H w + sum a Jw (a.w + Omega): equal on a torque-free vehicle, and right under any torque.
+    The printed h = R^T hI needs a constant momentum. Here p = H w + sum a Jw (a.w + Omega) from the
+    tachometers, which is equal on a torque-free vehicle and valid under any torque.
     """
 
     batched: ClassVar[bool] = True
@@ -101,16 +101,16 @@ class Ideal(Gains):
     """Largest command on each axis."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> IdealState:
-        """Return the state that starts on the branch nearer to the reference."""
+        """Return the initial state, with the sign of q nearer to the reference."""
         return IdealState(_nearer(measurement, reference))
 
     def step(
         self, state: IdealState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[IdealState, TorqueCommand, IdealSignals]:
         """Return the next state, the torque and the errors."""
-        seen, rate, wheel_speed, *_ = measurement
+        measured, rate, wheel_speed, *_ = measurement
         vehicle = (wheel_speed, self.inertia, self.wheel_axes, self.wheel_inertia, self._gains)
-        torque, e, wd, attitude = kernels.ideal(seen, rate, *reference, *state, *vehicle)
+        torque, e, wd, attitude = kernels.ideal(measured, rate, *reference, *state, *vehicle)
         return IdealState(attitude), TorqueCommand(torque), IdealSignals(e, wd)
 
     @cached_property
@@ -122,8 +122,9 @@ class Ideal(Gains):
 class Gradient(Gains):
     """Estimated inertia, by the gradient alone: tau = Y theta_hat - Kc e, theta_hat' = -ga Y^T e.
 
-    Equations (4.2) and (4.21); ga stays above zero where the paper prints zero (erratum 19). The
-    estimate of hI assumes a constant total momentum. Explicit Euler at the control period.
+    Equations (4.2) and (4.21); ga is above zero, where the paper prints zero (erratum 19). The
+    estimate of hI assumes a constant total momentum. Integrated by explicit Euler at the control
+    period.
     """
 
     batched: ClassVar[bool] = True
@@ -140,7 +141,7 @@ class Gradient(Gains):
     """Largest command on each axis."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> GradientState:
-        """Return the state that knows nothing, on the branch nearer to the reference."""
+        """Return the initial state: estimates of zero, the sign of q nearer to the reference."""
         lead = measurement.rate.shape[:-1]
         return GradientState(_nearer(measurement, reference), np.zeros((*lead, 9)))
 
@@ -148,8 +149,8 @@ class Gradient(Gains):
         self, state: GradientState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[GradientState, TorqueCommand, GradientSignals]:
         """Return the next state, the torque, the errors and the estimates."""
-        seen, rate, *_ = measurement
-        torque, e, wd, *after = kernels.gradient(seen, rate, *reference, *state, self._gains)
+        measured, rate, *_ = measurement
+        torque, e, wd, *after = kernels.gradient(measured, rate, *reference, *state, self._gains)
         return GradientState(*after), TorqueCommand(torque), GradientSignals(e, wd, state.theta_hat)
 
     @cached_property
@@ -162,11 +163,11 @@ class Gradient(Gains):
 class Adaptive(Gains):
     """Estimated inertia and momentum: the composite law (4.2), (4.5)-(4.9).
 
-    With erratum 15: ga Yf^T eps, and da ga Z. The estimate of hI assumes a constant total momentum.
-    The nine parameters converge only if the motion excites them; no turn about one fixed axis does
-    (erratum 21). Explicit Euler at the control period: at 1 kHz the sweep's largest |q - qd| is
-    2.33e-2 against 2.32e-2 in continuous time. The filter sees the torque within its limit, so the
-    limit must not be above what the actuators give.
+    Corrected by erratum 15: ga Yf^T eps, and da ga Z. The estimate of hI assumes a constant total
+    momentum. The nine parameters converge only if the motion excites them; a rotation about one
+    fixed axis does not (erratum 21). Explicit Euler at the control period: at 1 kHz the sweep's
+    largest |q - qd| is 2.33e-2, against 2.32e-2 in continuous time. The filter uses the limited
+    torque, so ``torque_limit`` must not exceed that of the actuators.
     """
 
     batched: ClassVar[bool] = True
@@ -178,13 +179,13 @@ class Adaptive(Gains):
     attitude_gain: float = gain("1/s", default=25.0, above=0.0)
     """lc: contraction rate of the attitude."""
     filter_bandwidth: float = gain("rad/s", default=2.0, above=0.0)
-    """lF, of the filters that stand in for the unmeasured acceleration."""
+    """lF: of the filters that replace the unmeasured acceleration."""
     adaptation_coupling: float = gain(default=2.0, above=0.0)
-    """da: share of the prediction error against that of the tracking error."""
+    """da: weight of the prediction error relative to the tracking error."""
     adaptation_gain: float = gain(default=1.0, above=0.0)
     """ga."""
     forgetting: float = gain("1/s", default=0.1, at_least=0.0)
-    """lf, of the information gathered; zero forgets nothing."""
+    """lf: forgetting rate of the information matrix."""
     torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
     """Largest command on each axis."""
 
@@ -192,14 +193,15 @@ class Adaptive(Gains):
         super().__post_init__()
         if self.filter_bandwidth * self.control_period >= 1.0:
             raise ValueError(
-                f"filter_bandwidth is {self.filter_bandwidth:g} rad/s, control_period "
-                f"{self.control_period:g} s: less than {1 / self.control_period:g} rad/s would do"
+                f"filter_bandwidth: got {self.filter_bandwidth:g} rad/s, should be less than "
+                f"{1 / self.control_period:g} rad/s at a control_period of "
+                f"{self.control_period:g} s"
             )
 
     def reset(self, measurement: Measurement, reference: Reference) -> AdaptiveState:
-        """Return the state that knows nothing, on the branch nearer to the reference.
+        """Return the initial state: estimates of zero, the sign of q nearer to the reference.
 
-        The filtered rate starts at the rate: from zero it would err for good (erratum 25).
+        The filtered rate starts at the rate: from zero it would keep an error (erratum 25).
         """
         lead = measurement.rate.shape[:-1]
         theta_hat, g, Z = np.zeros((*lead, 9)), np.zeros((*lead, 9)), np.zeros((*lead, 9, 9))
@@ -210,8 +212,10 @@ class Adaptive(Gains):
         self, state: AdaptiveState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[AdaptiveState, TorqueCommand, AdaptiveSignals]:
         """Return the next state, the torque, the errors and the estimates."""
-        seen, rate, *_ = measurement
-        torque, e, wd, eps, *after = kernels.adaptive(seen, rate, *reference, *state, self._gains)
+        measured, rate, *_ = measurement
+        torque, e, wd, eps, *after = kernels.adaptive(
+            measured, rate, *reference, *state, self._gains
+        )
         return (
             AdaptiveState(*after),
             TorqueCommand(torque),
@@ -226,6 +230,6 @@ class Adaptive(Gains):
 
 
 def _nearer(measurement: Measurement, reference: Reference) -> Array:
-    """Return the measured q or -q, whichever makes an angle below 180 deg with the reference."""
+    """Return the measured q or -q, whichever is nearer to the reference, (..., 4)."""
     along = np.sum(measurement.attitude * reference.attitude, axis=-1, keepdims=True)
     return np.where(along < 0.0, -measurement.attitude, measurement.attitude)

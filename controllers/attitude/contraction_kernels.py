@@ -1,7 +1,8 @@
 """The arithmetic of the contraction laws: one generalized ufunc for each, over any vehicles.
 
-Plain loops without fused or reordered sums: a vehicle's numbers are the same bits alone and in a
-batch. Numba's cache does not look into other files for changes, so all that is compiled is here.
+Plain loops without fused or reordered sums: a vehicle's numbers are bit for bit the same alone and
+in a batch. Numba's cache does not notice changes in other files, so that all compiled functions are
+in this one.
 """
 
 # mypy: disable-error-code="no-untyped-call, call-arg"
@@ -24,7 +25,7 @@ def _product(p: Any, q: Any) -> Any:
 
 @njit
 def _along(q: Any, u: Any) -> Any:
-    """Return J(q)^T u, which is the vector part of conj(q) u."""
+    """Return J(q)^T u, the vector part of conj(q) u."""
     return _product((q[0], -q[1], -q[2], -q[3]), u)[1:]
 
 
@@ -35,7 +36,7 @@ def _cross(a: Any, b: Any) -> Any:
 
 @njit
 def _signed(q: Any, before: Any, out: Any) -> None:
-    """Write q or -q, whichever is nearer to ``before``: an attitude sensor may report either."""
+    """Write q or -q, whichever is nearer to ``before``: a sensor may report either sign."""
     along = q[0] * before[0] + q[1] * before[1] + q[2] * before[2] + q[3] * before[3]
     sign = -1.0 if along < 0.0 else 1.0
     for i in range(4):
@@ -43,7 +44,7 @@ def _signed(q: Any, before: Any, out: Any) -> None:
 
 
 @njit
-def _wanted_rate(q: Any, w: Any, qd: Any, wr: Any, ar: Any, lc: float) -> Any:
+def _desired_rate(q: Any, w: Any, qd: Any, wr: Any, ar: Any, lc: float) -> Any:
     """Return wd, (3.8), and its derivative, (3.9)-(3.10), of paper 002.
 
     With u = qd' + lc qd they are 2 J(q)^T u and 2 J(q)^T u' - J(u)^T J(q) w, where
@@ -73,7 +74,7 @@ def _wanted_rate(q: Any, w: Any, qd: Any, wr: Any, ar: Any, lc: float) -> Any:
 
 @njit
 def _limited(torque: float, limit: float) -> float:
-    """Return the torque within +-limit; what is not a number stays so."""
+    """Return the torque within +-limit; NaN stays NaN."""
     if torque > limit:
         return limit
     if torque < -limit:
@@ -83,7 +84,7 @@ def _limited(torque: float, limit: float) -> float:
 
 @njit
 def _momentum_block(wd: Any, q: Any, out: Any) -> None:
-    """Write S(wd) R(q)^T, (3, 3): the columns of R^T are the inertial axes seen from the body."""
+    """Write S(wd) R(q)^T, (3, 3): the columns of R^T are the inertial axes in body axes."""
     conjugate = (q[0], -q[1], -q[2], -q[3])
     for j in range(3):
         axis = (0.0, 1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
@@ -116,7 +117,7 @@ def _feedback(y: Any, theta: Any, w: Any, wd: Any, kc: float, limit: float, e: A
         t[i] = _limited(total, limit)
 
 
-_MOTION = "(q),(v),(q),(v),(v),(q)"  # attitude, rate, the three of the reference, attitude before
+_MOTION = "(q),(v),(q),(v),(v),(q)"  # attitude, rate, three fields of the reference, last attitude
 
 
 @guvectorize(
@@ -132,7 +133,7 @@ def ideal(
     """Paper 002, (3.6), gains [lc, Kc, limit]; momentum from the tachometers."""
     lc, kc, limit = gains
     _signed(q_in, before, q)
-    wd, dwd = _wanted_rate(q, w, qd, wr, ar, lc)
+    wd, dwd = _desired_rate(q, w, qd, wr, ar, lc)
     px, py, pz = 0.0, 0.0, 0.0
     for n in range(Jw.size):
         h = Jw[n] * (axes[n, 0] * w[0] + axes[n, 1] * w[1] + axes[n, 2] * w[2] + wheel_speed[n])
@@ -162,7 +163,7 @@ def gradient(
     """Paper 002, (4.2) and (4.21), gains [lc, Kc, limit, ga, period]."""
     lc, kc, limit, ga, period = gains
     _signed(q_in, before, q)
-    wd, dwd = _wanted_rate(q, w, qd, wr, ar, lc)
+    wd, dwd = _desired_rate(q, w, qd, wr, ar, lc)
     block = np.empty((3, 3))
     _momentum_block(wd, q, block)
     y = _regressor(dwd, block)
@@ -191,7 +192,7 @@ def adaptive(
     """
     lc, kc, limit, ga, period, lF, da, lf = gains
     _signed(q_in, before, q)
-    wd, dwd = _wanted_rate(q, w, qd, wr, ar, lc)
+    wd, dwd = _desired_rate(q, w, qd, wr, ar, lc)
     block = np.empty((3, 3))
     _momentum_block(wd, q, block)
     y = _regressor(dwd, block)
@@ -216,8 +217,8 @@ def adaptive(
             carried += Z[i, j] * change[j]
             information = yf[0, i] * yf[0, j] + yf[1, i] * yf[1, j] + yf[2, i] * yf[2, j]
             Z_out[i, j] = Z[i, j] + period * (ga * information - lf * Z[i, j])
-        surprise = yf[0, i] * eps[0] + yf[1, i] * eps[1] + yf[2, i] * eps[2]
-        g_out[i] = g[i] + period * (ga * surprise - lf * g[i] + carried)
+        correction = yf[0, i] * eps[0] + yf[1, i] * eps[1] + yf[2, i] * eps[2]
+        g_out[i] = g[i] + period * (ga * correction - lf * g[i] + carried)
 
     _momentum_block(w, q, block)
     for i in range(3):

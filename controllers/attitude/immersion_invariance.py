@@ -1,8 +1,8 @@
 """Attitude tracking by immersion and invariance, in Euler angles: paper 000.
 
-The angles are roll, pitch, yaw, R = Rz Ry Rx, body to inertial, and are unwrapped: 5 rad of yaw to
-go are turned through, even if 1.3 rad the other way would do (erratum 12). The law is local: pitch
-= +-90 deg is singular, and nothing here steps around it (erratum 10); watch ``singularity``.
+The angles are roll, pitch, yaw of R = Rz Ry Rx, body to inertial, unwrapped: a yaw error of 5 rad
+is turned through, although 1.3 rad the other way is the same attitude (erratum 12). The law is
+local: pitch = +-90 deg is singular and not avoided (erratum 10); see the signal ``singularity``.
 """
 
 # mypy: disable-error-code="no-untyped-call, call-arg"
@@ -19,28 +19,28 @@ from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand
 
 
 class State(NamedTuple):
-    """Memory: which turn the angles are on."""
+    """Memory of the law: the last angles, for unwrapping."""
 
     angles: Array
     """Last measured roll, pitch, yaw [rad], unwrapped, (..., 3)."""
     wanted_angles: Array
-    """Last wanted roll, pitch, yaw [rad], unwrapped, (..., 3)."""
+    """Last desired roll, pitch, yaw [rad], unwrapped, (..., 3)."""
 
 
 class Signals(NamedTuple):
-    """What the law shows."""
+    """Signals of the law."""
 
     x_e: Array
-    """Wanted less measured angles [rad], (..., 3)."""
+    """Desired less measured angles [rad], (..., 3)."""
     z: Array
     """Distance from the manifold, x' - x_d' - K x_e [rad/s], (..., 3)."""
     singularity: Array
-    """How far the pitch is from +-90 deg [rad], (..., 1)."""
+    """Distance of the pitch from +-90 deg [rad], (..., 1)."""
 
 
 @dataclass(frozen=True)
 class ImmersionInvariance(Gains):
-    """Law (15) of paper 000, with p = R^T p_r (erratum 2) read from the tachometers.
+    """Law (15) of paper 000, with p = R^T p_r (erratum 2) computed from the tachometers.
 
     The torque H J^-1 (v - J' w) - p x w, v = x_d'' + (K + Gamma) x_e' + Gamma K x_e, makes
     z' = -Gamma z and x_e' = -K x_e - z. K and Gamma may be exchanged (erratum 8).
@@ -59,14 +59,14 @@ class ImmersionInvariance(Gains):
     manifold_gain: float = gain("1/s", default=5.0, above=0.0)
     """Gamma: rate at which the manifold z = 0 is reached."""
     unwrap_from: Array = gain("rad", (3,), default=(0.0, 0.0, 0.0))
-    """The first measured roll and yaw are taken within half a turn of these."""
+    """The first measured angles are unwrapped to within 180 deg of these."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
-        """Return the angles, the measured ones on the turn of ``unwrap_from``."""
+        """Return the initial state, the measured angles unwrapped to ``unwrap_from``."""
         angles = att.to_euler_zyx(measurement.attitude)
         turns = np.rint((angles - self.unwrap_from) / (2.0 * pi))
-        wanted = np.broadcast_to(att.to_euler_zyx(reference.attitude), angles.shape)
-        return State(angles - 2.0 * pi * turns, wanted.copy())
+        desired = np.broadcast_to(att.to_euler_zyx(reference.attitude), angles.shape)
+        return State(angles - 2.0 * pi * turns, desired.copy())
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
@@ -109,7 +109,7 @@ def _angle_rates(x: Any, w: Any) -> Any:
 
 @njit
 def _drift(x: Any, dx: Any, w: Any) -> Any:
-    """Return J'(x, x') w, what x'' is at constant w."""
+    """Return J'(x, x') w, which is x'' at constant w."""
     cp, tp = cos(x[1]), sin(x[1]) / cos(x[1])
     swing = sin(x[0]) * w[1] + cos(x[0]) * w[2]
     dswing = (cos(x[0]) * w[1] - sin(x[0]) * w[2]) * dx[0]
@@ -123,19 +123,22 @@ def _drift(x: Any, dx: Any, w: Any) -> Any:
     cache=True,
 )
 def _law(
-    q: Any, w: Any, wheel_speed: Any, qd: Any, wr: Any, ar: Any, before: Any, wanted_before: Any,
+    q: Any, w: Any, wheel_speed: Any, qd: Any, wr: Any, ar: Any, before: Any, desired_before: Any,
     H: Any, axes: Any, Jw: Any, gains: Any,
-    torque: Any, x_e: Any, z: Any, angles: Any, wanted_angles: Any,
+    torque: Any, x_e: Any, z: Any, angles: Any, desired_angles: Any,
 ) -> None:  # fmt: skip
-    """Plain loops without fused or reordered sums: the same bits alone and in a batch."""
+    """Write torque, errors and unwrapped angles.
+
+    Plain loops without fused or reordered sums: bit for bit the same alone and in a batch.
+    """
     K, Gamma = gains
-    x, xd = _euler(q, before), _euler(qd, wanted_before)
+    x, xd = _euler(q, before), _euler(qd, desired_before)
     dx, dxd = _angle_rates(x, w), _angle_rates(xd, wr)
     carried, bend, turned = _drift(x, dx, w), _drift(xd, dxd, wr), _angle_rates(xd, ar)
 
     a = np.empty(3)
     for i in range(3):
-        angles[i], wanted_angles[i], x_e[i] = x[i], xd[i], xd[i] - x[i]
+        angles[i], desired_angles[i], x_e[i] = x[i], xd[i], xd[i] - x[i]
         z[i] = dx[i] - dxd[i] - K * x_e[i]
         # v - J' w, with v = -Gamma z + x_d'' + K (x_d' - x')
         a[i] = turned[i] + bend[i] + K * (dxd[i] - dx[i]) - Gamma * z[i] - carried[i]

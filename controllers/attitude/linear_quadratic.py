@@ -1,11 +1,11 @@
 """Linear-quadratic attitude control with reaction wheels, infinite and finite horizon.
 
 R. Vazquez, "Tema 8: Control activo de la actitud", Universidad de Sevilla 2016 (paper 004). The
-state is x = [delta, a]: the rate less the wanted rate, and a = 2 dq_v / dq_0 of the error
-quaternion dq = conj(q_ref) q, which is the same for q and -q and has no value half a turn away.
-The torque u turns a bus of inertia I, which is without the wheels' axial inertia: I w' + w x I w
-= u. The wheels' absolute momentum h = sum a Jw (a.w + Omega) gives it by h' = -u + h x w, and -h'
-is what they do to the bus. All arrays may have leading vehicle axes.
+state is x = [delta, a]: the measured less the desired rate, and a = 2 dq_v / dq_0 of the error
+quaternion dq = conj(q_ref) q. a is equal for q and -q and undefined at an error of 180 deg. The
+torque u acts on a bus of inertia I, without the wheels' axial inertia: I w' + w x I w = u. The
+wheels' absolute momentum h = sum a Jw (a.w + Omega) follows h' = -u + h x w, and -h' is the torque
+of the wheels on the bus. All arrays may have leading vehicle axes.
 """
 
 from dataclasses import dataclass
@@ -26,38 +26,38 @@ _TABLE_STEP = 0.1  # [s] between tabulated gains; 2e-9 of the largest, interpola
 
 
 class State(NamedTuple):
-    """Memory of these laws: none."""
+    """Memory of these laws: empty."""
 
 
 class Signals(NamedTuple):
-    """What these laws show."""
+    """Signals of these laws."""
 
     a: Array
     """Attitude error 2 dq_v / dq_0 [rad], (..., 3)."""
     delta: Array
-    """Rate less the wanted rate, component by component [rad/s], (..., 3)."""
+    """Measured less desired rate, component by component [rad/s], (..., 3)."""
     u: Array
-    """Torque wanted on the bus, that of h x w apart [N m], body axes, (..., 3)."""
+    """Commanded torque on the bus without h x w [N m], body axes, (..., 3)."""
     h: Array
     """Absolute momentum of the wheels [N m s], body axes, (..., 3)."""
 
 
 class Weights(NamedTuple):
-    """Of the cost: the integral of x^T Q x + u^T R u, without a factor of 1/2."""
+    """Weights of the cost: the integral of x^T Q x + u^T R u, without a factor of 1/2."""
 
     Q: Array
-    """(6, 6); zero or more, and not zero on the angle (erratum 2)."""
+    """(6, 6); positive semidefinite, positive definite in the angles (erratum 2)."""
     R: Array
-    """(3, 3); more than zero (erratum 2)."""
+    """(3, 3); positive definite (erratum 2)."""
 
 
 def axis_gains(
     inertia: Array, rate_weight: Array, angle_weight: Array, torque_weight: Array
 ) -> tuple[Array, Array]:
-    """Return (kw [N m s/rad], ka [N m/rad]) of u = -kw w - ka a on an axis by itself, (...).
+    """Return (kw [N m s/rad], ka [N m/rad]) of u = -kw w - ka a on one principal axis, (...).
 
-    The closed form of the Riccati equation for ``inertia`` a'' = u [kg m^2], weights as
-    ``Regulator``'s; what three principal axes get. A constant torque M leaves an angle of M / ka.
+    Closed form of the Riccati equation for ``inertia`` a'' = u [kg m^2], with the weights of
+    ``Regulator``. A constant torque M leaves an angle of M / ka.
     """
     ka = np.sqrt(angle_weight / torque_weight)
     kw = np.sqrt((rate_weight + 2.0 * inertia * torque_weight * ka) / torque_weight)
@@ -65,7 +65,7 @@ def axis_gains(
 
 
 def steady_cost(inertia: Array, weights: Weights) -> Array:
-    """Return P (6, 6) of the algebraic Riccati equation: the cost from x on is x^T P x."""
+    """Return P (6, 6) of the algebraic Riccati equation: the cost from a state x on is x^T P x."""
     A, B = linearized(inertia, np.zeros(3))
     cost: Array = solve_continuous_are(A, B, *weights)
     return cost
@@ -92,9 +92,9 @@ def feedback(inertia: Array, weights: Weights, cost: Array) -> Array:
 def cost_to_go(
     inertia: Array, weights: Weights, motion: Regulation, final: Array, time: Array
 ) -> Array:
-    """Return P (n, 6, 6) at each ``time`` (n,) [s], rising, by the Riccati differential equation.
+    """Return P (n, 6, 6) at each ``time`` (n,) [s] by the Riccati differential equation.
 
-    P is ``final`` (6, 6) at the last time, and is solved from there back to the first.
+    The times increase; P is ``final`` (6, 6) at the last, and is integrated backwards from there.
     """
     (Q, R), (_, B) = weights, linearized(inertia, np.zeros(3))
     S = B @ np.linalg.solve(R, B.T)
@@ -114,9 +114,9 @@ def cost_to_go(
 
 @dataclass(frozen=True)
 class Regulator(Gains):
-    """Infinite horizon: u = u_ref + K x with one K, from the algebraic Riccati equation.
+    """Infinite horizon: u = u_ref + K x with constant K, from the algebraic Riccati equation.
 
-    u_ref = I w_ref' + w_ref x I w_ref is zero for a reference at rest, for which it is meant.
+    Meant for a reference at rest, for which u_ref = I w_ref' + w_ref x I w_ref is zero.
     """
 
     batched: ClassVar[bool] = True
@@ -141,16 +141,16 @@ class Regulator(Gains):
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
-        """Return the torque on the bus, -h', and what it is made of."""
-        seen, rate, wheel_speed, *_ = measurement
+        """Return the torque on the bus, -h', and the signals."""
+        measured, rate, wheel_speed, *_ = measurement
         vehicle = (self.inertia, self.wheel_axes, self.wheel_inertia)
-        torque, *shown = kernels.linear(
-            seen, rate, *reference, wheel_speed, self.gain_at(time), *vehicle, self._full_rate
+        torque, *signals = kernels.linear(
+            measured, rate, *reference, wheel_speed, self.gain_at(time), *vehicle, self._full_rate
         )
-        return state, TorqueCommand(torque), Signals(*shown)
+        return state, TorqueCommand(torque), Signals(*signals)
 
     def gain_at(self, time: float) -> Array:
-        """Return K (3, 6) of u = K [delta, a]."""
+        """Return K (3, 6) of u = u_ref + K [delta, a] at ``time`` [s]."""
         return self._steady
 
     @property
@@ -170,10 +170,11 @@ class Regulator(Gains):
 class Tracker(Regulator):
     """Finite horizon, for one rest-to-rest turn: u = u_ref + K(t) x with h' = -u + h x w.
 
-    The Riccati differential equation is solved from the end of the turn back, once, and the gains
-    are kept in a table. At the end P is that of the regulator, whose gain then stays. The last
-    three gains must be those of the scenario's ``references:Regulation``. The lecture prints
-    h' = -u + h x delta (erratum 1), which leaves the torque h x w_ref to the feedback.
+    The Riccati differential equation is integrated once, backwards from the end of the turn, and
+    the gains are tabulated. The final P is that of the regulator, whose gain applies afterwards.
+    ``angle``, ``duration`` and ``axis`` must equal those of the scenario's
+    ``references:Regulation``. The lecture prints h' = -u + h x delta (erratum 1), which leaves the
+    torque h x w_ref to the feedback.
     """
 
     angle: float = gain("rad", default=0.5 * np.pi)
@@ -184,7 +185,7 @@ class Tracker(Regulator):
     """Of the turn; normalized."""
 
     def gain_at(self, time: float) -> Array:
-        """Return K (3, 6) of u = u_ref + K [delta, a]; after the turn it is the regulator's."""
+        """Return K (3, 6) at ``time`` [s]; after the turn it is the regulator's."""
         K: Array = self._table(min(time, self.duration))
         return K
 
@@ -199,7 +200,7 @@ class Tracker(Regulator):
 
 @dataclass(frozen=True)
 class PrintedTracker(Tracker):
-    """As ``Tracker``, with h' = -u + h x delta as printed (erratum 1): 10 deg off, or more."""
+    """``Tracker`` with h' = -u + h x delta as printed (erratum 1): errors of 10 deg or more."""
 
     _full_rate: ClassVar[float] = 0.0
 

@@ -3,10 +3,9 @@
 J. Servín Aguilar, "Control de orientación para satélites con compensación de vibración", UNAM 2022
 (paper 001), chapter 3. The attitude error sigma_e is in modified Rodrigues parameters (MRP), from
 desired to body axes, of the set with |sigma_e| <= 1. Two signs of the printed (3.5) are wrong (E9):
-it gives 2 sigma / (1 - |sigma|^2) where there is no error. Here quaternions give it, so that
-neither attitude needs a set of its own, and q and -q are one attitude. The laws remember nothing:
-at half a turn the error changes sides, and with it the torque. All arrays may have leading vehicle
-axes.
+for equal attitudes it gives 2 sigma / (1 - |sigma|^2). Here sigma_e is computed from quaternions,
+so that q and -q are one attitude. The laws have no memory: at an error of 180 deg the sign of the
+error changes, and with it the torque. All arrays may have leading vehicle axes.
 """
 
 from dataclasses import dataclass
@@ -21,16 +20,16 @@ from . import pd_plus_kernels as kernels
 
 
 class State(NamedTuple):
-    """Memory of these laws: none."""
+    """Memory of these laws: empty."""
 
 
 class ClassicalSignals(NamedTuple):
-    """What the classical law shows; the torque is the sum of the last two."""
+    """Signals of the classical law; the torque is the sum of the last two."""
 
     sigma_e: Array
     """Attitude error, MRP, (..., 3)."""
     w_e: Array
-    """Rate less the wanted rate [rad/s], body axes, (..., 3)."""
+    """Measured less desired rate [rad/s], body axes, (..., 3)."""
     feedforward: Array
     """M R_e^T wd' + wb x M wb [N m], (..., 3)."""
     feedback: Array
@@ -38,7 +37,7 @@ class ClassicalSignals(NamedTuple):
 
 
 class ModifiedSignals(NamedTuple):
-    """What the modified law shows; the torque is the sum of the last two."""
+    """Signals of the modified law; the torque is the sum of the last two."""
 
     sigma_e: Array
     """Attitude error, MRP, (..., 3)."""
@@ -51,7 +50,7 @@ class ModifiedSignals(NamedTuple):
 
 
 class RobustSignals(NamedTuple):
-    """What the robust law shows: as the modified law, and the third part of the torque."""
+    """Signals of the robust law: those of the modified law, and the third part of the torque."""
 
     sigma_e: Array
     s: Array
@@ -61,7 +60,7 @@ class RobustSignals(NamedTuple):
     """-tbar^2 s / (tbar |s| + eps), (3.19) [N m], (..., 3)."""
 
 
-def wanted_torque(
+def commanded_torque(
     attitude: Array,
     rate: Array,
     momentum: Array,
@@ -69,12 +68,12 @@ def wanted_torque(
     inertia: Array,
     gains: Array,
 ) -> tuple[Array, Array, Array]:
-    """Return the torque [N m] of (3.18), or of (5.9), sigma_e and s [rad/s], each (..., 3).
+    """Return the torque [N m] of (3.18) or (5.9), sigma_e and s [rad/s], each (..., 3), body axes.
 
-    ``attitude`` (..., 4) and ``rate`` (..., 3) [rad/s] are measured; ``momentum`` (..., 3) [N m s]
-    is M w of a rigid bus in chapter 3, or h, with the wheel's, in chapter 5; body axes. ``inertia``
-    (3, 3) [kg m^2]; ``gains`` is [lam, Kc, tbar, eps], units as in ``Robust``, eps above zero: a
-    tbar of zero leaves out the disturbance term and makes it (3.7).
+    ``attitude`` (..., 4) and ``rate`` (..., 3) [rad/s] are measured. ``momentum`` (..., 3) [N m s],
+    body axes, is M w of a rigid bus in chapter 3, or the total h with the wheels in chapter 5.
+    ``inertia`` is (3, 3) [kg m^2]. ``gains`` is [lam, Kc, tbar, eps] with the units of ``Robust``;
+    eps is above zero, and a tbar of zero makes it (3.7), without the disturbance term.
     """
     torque, sigma_e, s, *_ = kernels.modified(attitude, rate, momentum, *reference, inertia, gains)
     return torque, sigma_e, s
@@ -84,9 +83,9 @@ def wanted_torque(
 class Classical(Gains):
     """PD+: tau = M R_e^T wd' + wb x M wb - kp sigma_e - kv w_e, with wb = R_e^T wd.
 
-    The thesis takes kp = wn^2 and kv = 2 wn with wn = 3.5 rad/s; as sigma_e is a quarter of the
-    angle, that would need 4 wn^2 M and 2 wn M, and its loop has 0.5 rad/s and a damping of 0.6
-    (E26): it overshoots by 11.5 %.
+    The thesis sets kp = wn^2 and kv = 2 wn with wn = 3.5 rad/s. Since sigma_e is a quarter of the
+    angle, this would need 4 wn^2 M and 2 wn M. The actual loop has 0.5 rad/s and a damping ratio of
+    0.6 (E26) and overshoots by 11.5 %.
     """
 
     batched: ClassVar[bool] = True
@@ -94,7 +93,7 @@ class Classical(Gains):
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """M: of the rigid bus, about its centre of mass, body axes."""
     attitude_gain: float = gain("N m", default=12.25, above=0.0)
-    """kp, on the MRP: the stiffness is a quarter of it."""
+    """kp, on the MRP: the stiffness per angle is a quarter of it."""
     rate_gain: float = gain("N m s/rad", default=7.0, above=0.0)
     """kv, the same on each axis."""
 
@@ -105,10 +104,10 @@ class Classical(Gains):
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, ClassicalSignals]:
-        """Return the torque, the errors and the torque's parts."""
-        seen, rate = measurement.attitude, measurement.rate
-        torque, *shown = kernels.classical(seen, rate, *reference, self.inertia, self._gains)
-        return state, TorqueCommand(torque), ClassicalSignals(*shown)
+        """Return the torque, the errors and the parts of the torque."""
+        attitude, rate = measurement.attitude, measurement.rate
+        torque, *signals = kernels.classical(attitude, rate, *reference, self.inertia, self._gains)
+        return state, TorqueCommand(torque), ClassicalSignals(*signals)
 
     @cached_property
     def _gains(self) -> Array:
@@ -138,13 +137,13 @@ class Modified(Gains):
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, ModifiedSignals]:
-        """Return the torque, the errors and the torque's parts."""
-        seen, rate = measurement.attitude, measurement.rate
+        """Return the torque, the errors and the parts of the torque."""
+        attitude, rate = measurement.attitude, measurement.rate
         momentum = kernels.rigid_momentum(self.inertia, rate)
-        torque, *shown, _ = kernels.modified(
-            seen, rate, momentum, *reference, self.inertia, self._gains
+        torque, *signals, _ = kernels.modified(
+            attitude, rate, momentum, *reference, self.inertia, self._gains
         )
-        return state, TorqueCommand(torque), ModifiedSignals(*shown)
+        return state, TorqueCommand(torque), ModifiedSignals(*signals)
 
     @cached_property
     def _gains(self) -> Array:
@@ -153,12 +152,12 @@ class Modified(Gains):
 
 @dataclass(frozen=True)
 class Robust(Gains):
-    """Modified PD+ with compensation of a disturbance of which only a bound is known, (3.18).
+    """Modified PD+ with compensation of a disturbance with a known bound, (3.18).
 
-    The third part, (3.19), is almost a relay: its slope at s = 0 is tbar^2 / eps, 16000 N m s/rad
-    by default, a pole at 1160 to 1540 rad/s on the thesis' bus. A loop whose period is more than
-    twice the inertia over that slope, 1.3 ms there, chatters. Errors end within 2.63 times the
-    ball printed in Corollary 3.2.1 (E25).
+    The third part, (3.19), is a smoothed relay: its slope at s = 0 is tbar^2 / eps, by default
+    16000 N m s/rad, a pole at 1160 to 1540 rad/s on the thesis' bus. The loop chatters if its
+    period is above twice the inertia over that slope, 1.3 ms there. The errors' ultimate bound is
+    2.63 times the ball printed in Corollary 3.2.1 (E25).
     """
 
     batched: ClassVar[bool] = True
@@ -172,11 +171,11 @@ class Robust(Gains):
     disturbance_bound: float = gain("N m", default=0.04, above=0.0)
     """tbar: largest norm of the disturbance; the thesis' reaches 0.0387 (E24)."""
     smoothing: float = gain("W", default=1e-7, above=0.0)
-    """eps: what the relay may lose to smoothness."""
+    """eps: smoothing of the relay, which reduces the power that it takes from s by at most eps."""
     wheel_axes: Array = gain(shape=("wheel", 3), default=np.zeros((0, 3)), form="unit vector")
-    """Of reaction wheels, body axes: their momentum turns with the bus; ours."""
+    """Unit spin axes of reaction wheels, body axes, one row for each; not in the thesis."""
     wheel_inertia: Array = gain("kg m^2", ("wheel",), default=(), at_least=0.0)
-    """Axial, of each, which ``inertia`` is without."""
+    """Axial inertia of each wheel, not contained in ``inertia``."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the empty state."""
@@ -185,13 +184,13 @@ class Robust(Gains):
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, RobustSignals]:
-        """Return the torque, the errors and the torque's parts."""
-        seen, rate, M = measurement.attitude, measurement.rate, self.inertia
+        """Return the torque, the errors and the parts of the torque."""
+        attitude, rate, M = measurement.attitude, measurement.rate, self.inertia
         momentum = kernels.gyrostat_momentum(
             M, rate, self.wheel_axes, self.wheel_inertia, measurement.wheel_speed
         )
-        torque, *shown = kernels.modified(seen, rate, momentum, *reference, M, self._gains)
-        return state, TorqueCommand(torque), RobustSignals(*shown)
+        torque, *signals = kernels.modified(attitude, rate, momentum, *reference, M, self._gains)
+        return state, TorqueCommand(torque), RobustSignals(*signals)
 
     @cached_property
     def _gains(self) -> Array:

@@ -1,7 +1,8 @@
 """The arithmetic of the PD+ laws: one generalized ufunc for each, over any vehicles.
 
-Plain sums that no compiler reorders: a vehicle's numbers are the same bits alone and in a batch.
-Numba's cache does not look into other files for changes, so all that is compiled is here.
+Sums are plain loops that no compiler reorders: a vehicle's numbers are bit for bit the same alone
+and in a batch. Numba's cache does not notice changes in other files, so that all compiled functions
+are in this one.
 """
 
 # mypy: disable-error-code="no-untyped-call, call-arg"
@@ -29,10 +30,10 @@ def _times(M: Any, v: Any) -> Any:
 
 @njit
 def _error(q: Any, qd: Any) -> Any:
-    """Return the quaternion conj(qd) q, desired axes to body, of the two the shorter turn.
+    """Return the error quaternion conj(qd) q, desired axes to body, with the sign of least angle.
 
-    At half a turn its scalar is zero and either would do: the sign is then that of the vector, so
-    that q and -q still give the same.
+    At 180 deg its scalar is zero and both signs are valid: the sign is then chosen by the vector,
+    so that q and -q give the same result.
     """
     w = qd[0] * q[0] + qd[1] * q[1] + qd[2] * q[2] + qd[3] * q[3]
     x = qd[0] * q[1] - qd[1] * q[0] - qd[2] * q[3] + qd[3] * q[2]
@@ -44,8 +45,8 @@ def _error(q: Any, qd: Any) -> Any:
 
 
 @njit
-def _seen_from_body(scalar: Any, vector: Any, v: Any) -> Any:
-    """Return R_e^T v: desired axes to body axes."""
+def _to_body_axes(scalar: Any, vector: Any, v: Any) -> Any:
+    """Return R_e^T v: components in body axes of ``v`` in desired axes."""
     a = _cross(vector, v)
     b = _cross(vector, a)
     return (
@@ -57,10 +58,10 @@ def _seen_from_body(scalar: Any, vector: Any, v: Any) -> Any:
 
 @njit
 def _tracking(q: Any, w: Any, qd: Any, wd: Any, ad: Any) -> Any:
-    """Return sigma_e, the wanted rate and acceleration seen from the body, and w_e."""
+    """Return sigma_e, the desired rate and acceleration in body axes, and w_e."""
     scalar, vector = _error(q, qd)
     sigma = (vector[0] / (1.0 + scalar), vector[1] / (1.0 + scalar), vector[2] / (1.0 + scalar))
-    wb, ab = _seen_from_body(scalar, vector, wd), _seen_from_body(scalar, vector, ad)
+    wb, ab = _to_body_axes(scalar, vector, wd), _to_body_axes(scalar, vector, ad)
     return sigma, wb, ab, (w[0] - wb[0], w[1] - wb[1], w[2] - wb[2])
 
 
@@ -114,10 +115,10 @@ def modified(
         torque[i] = feedforward[i] + feedback[i] + compensation[i]
 
 
-# Not a matrix product of NumPy's: BLAS may round one vehicle's differently in a batch than alone.
+# Not NumPy's matrix product: BLAS may round differently in a batch than alone.
 @guvectorize(["void(f8[:,:],f8[:],f8[:])"], "(v,v),(v)->(v)", cache=True)
 def rigid_momentum(M: Any, w: Any, momentum: Any) -> None:
-    """Return M w."""
+    """Write M w [N m s]."""
     for i in range(3):
         momentum[i] = _dot(M[i], w)
 
@@ -130,7 +131,7 @@ def rigid_momentum(M: Any, w: Any, momentum: Any) -> None:
 def gyrostat_momentum(
     M: Any, w: Any, axes: Any, wheel_inertia: Any, wheel_speed: Any, momentum: Any
 ) -> None:
-    """Return M w and that of wheels, M being without their axial inertia."""
+    """Write M w plus the momentum of the wheels [N m s]; M is without their axial inertia."""
     for i in range(3):
         momentum[i] = _dot(M[i], w)
     for n in range(wheel_speed.size):

@@ -1,9 +1,9 @@
 """Lyapunov quaternion feedback and rate damping with reaction wheels: u = -(k q_e + c w).
 
 R. Vazquez, "Tema 8: Control activo de la actitud", Universidad de Sevilla 2016 (paper 004). q_e is
-the vector of the error quaternion conj(q_ref) q, for a reference at rest. u and the wheels' h are
-those of ``linear_quadratic``: h' = -u + h x w. The path of q is kept continuous from the sign that
-is measured first, so that no law minds which one a sensor reports later. All arrays may have
+the vector part of the error quaternion conj(q_ref) q, for a reference at rest. u and the wheels' h
+are as in ``linear_quadratic``: h' = -u + h x w. The path of q is kept continuous from the first
+measurement on, so that the sign that a sensor reports later does not matter. All arrays may have
 leading vehicle axes.
 """
 
@@ -26,22 +26,22 @@ class State(NamedTuple):
     attitude: Array
     """Last measured quaternion, with the sign that keeps its path continuous, (..., 4)."""
     sign: Array
-    """1.0 or -1.0: that of k, (..., 1)."""
+    """Sign of k: 1.0 or -1.0, (..., 1)."""
     path: Array
-    """Angle turned through so far, whichever way: the integral of |w| [rad], (..., 1)."""
+    """Length of the path so far: the integral of |w| [rad], (..., 1)."""
     impulse: Array
     """Integral of |u| so far [N m s], (..., 1)."""
 
 
 class Signals(NamedTuple):
-    """What these laws show."""
+    """Signals of these laws."""
 
     error: Array
     """conj(q_ref) q, on the continuous path, (..., 4)."""
     k: Array
-    """In force, with its sign [N m], (..., 1)."""
+    """Present gain with its sign [N m], (..., 1)."""
     u: Array
-    """Torque wanted on the bus, that of h x w apart [N m], body axes, (..., 3)."""
+    """Commanded torque on the bus without h x w [N m], body axes, (..., 3)."""
     path: Array
     """As in the state, (..., 1)."""
     impulse: Array
@@ -49,8 +49,8 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _OnWheels(Gains, ABC):
-    """What the laws of this module have in common."""
+class _WheelLaw(Gains, ABC):
+    """Base of the laws of this module."""
 
     batched: ClassVar[bool] = True
 
@@ -64,7 +64,7 @@ class _OnWheels(Gains, ABC):
     """c, the same on each axis."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
-        """Return the state that begins with the sign measured, nothing turned or spent yet."""
+        """Return the initial state, with the measured sign of q."""
         lead = measurement.rate.shape[:-1]
         none = np.zeros((*lead, 1))
         sign = self._sign(np.sum(reference.attitude * measurement.attitude, axis=-1, keepdims=True))
@@ -73,21 +73,21 @@ class _OnWheels(Gains, ABC):
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
-        """Return the next state, the torque on the bus, -h', and what it is made of."""
-        seen, rate, wheel_speed, *_ = measurement
+        """Return the next state, the torque on the bus, -h', and the signals."""
+        measured, rate, wheel_speed, *_ = measurement
         wheels = (self.wheel_axes, self.wheel_inertia)
         torque, error, k, u, *after = kernels.quaternion(
-            seen, rate, reference.attitude, wheel_speed, *state, *wheels, self._gains
+            measured, rate, reference.attitude, wheel_speed, *state, *wheels, self._gains
         )
-        shown = Signals(error, k, u, state.path.copy(), state.impulse.copy())
-        return State(*after), TorqueCommand(torque), shown
+        signals = Signals(error, k, u, state.path.copy(), state.impulse.copy())
+        return State(*after), TorqueCommand(torque), signals
 
     @abstractmethod
     def _law(self) -> tuple[float, float]:
-        """Return k and the hysteresis, of which an infinite one never changes its sign."""
+        """Return k [N m] and the hysteresis; an infinite one keeps the sign of k."""
 
     def _sign(self, scalar: Array) -> Array:
-        """Return the sign of k at the start (..., 1), where q_e has the ``scalar`` (..., 1)."""
+        """Return the initial sign of k (..., 1) for the error quaternion's ``scalar`` (..., 1)."""
         return np.ones_like(scalar)
 
     @cached_property
@@ -97,38 +97,38 @@ class _OnWheels(Gains, ABC):
 
 
 @dataclass(frozen=True)
-class Fixed(_OnWheels):
-    """u = -(k q_e + c w): of one attitude's two quaternions it wants 1 if k > 0, -1 if k < 0.
+class Fixed(_WheelLaw):
+    """u = -(k q_e + c w) with constant k: stabilizes the error quaternion 1 if k > 0, -1 if k < 0.
 
-    From the wrong one it unwinds: it turns on by up to 360 deg, away from where it already is. That
-    one is a saddle, left at the positive root s of I s^2 + c s - |k|/2; the other is asymptotically
-    stable, by I s^2 + c s + |k|/2.
+    From the other one, which is the same attitude, it unwinds: it rotates by up to 360 deg. That
+    equilibrium is a saddle, left at the positive root s of I s^2 + c s - |k|/2; the stabilized one
+    is asymptotically stable, by I s^2 + c s + |k|/2.
     """
 
     attitude_gain: float = gain("N m", default=1.0)
-    """k, on the quaternion: the stiffness is half of it."""
+    """k, on the quaternion: the stiffness per angle is half of it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.attitude_gain == 0.0:
-            raise ValueError("attitude_gain: got 0, should be any other number")
+            raise ValueError("attitude_gain: got 0, should not be zero")
 
     def _law(self) -> tuple[float, float]:
         return self.attitude_gain, inf
 
 
 @dataclass(frozen=True)
-class Switched(_OnWheels):
-    """k = k0 sgn(q0), with sgn(0) = 1 and a hysteresis (erratum 7): the shorter way, always.
+class Switched(_WheelLaw):
+    """k = k0 sgn(q0), with sgn(0) = 1 and a hysteresis (erratum 7): always the shorter way.
 
-    With sgn(0) = 0, as often programmed, it would be content half a turn away; without hysteresis
-    the noise of a star tracker would switch it to and fro there.
+    With sgn(0) = 0, a common implementation, the torque would vanish at an error of 180 deg;
+    without hysteresis the noise of a star tracker would cause repeated switching there.
     """
 
     attitude_gain: float = gain("N m", default=1.0, above=0.0)
-    """k0, on the quaternion: the stiffness is half of it."""
+    """k0, on the quaternion: the stiffness per angle is half of it."""
     hysteresis: float = gain(default=0.05, at_least=0.0, below=1.0)
-    """How far past zero q0 must be for the sign to change."""
+    """Value that q0 has to pass beyond zero before the sign changes."""
 
     def _law(self) -> tuple[float, float]:
         return self.attitude_gain, self.hysteresis
@@ -138,10 +138,10 @@ class Switched(_OnWheels):
 
 
 @dataclass(frozen=True)
-class RateDamping(_OnWheels):
-    """u = -c w: the rates vanish, the wheels take the momentum, any attitude is left (erratum 6).
+class RateDamping(_WheelLaw):
+    """u = -c w: the rates vanish, the wheels take the momentum, the attitude is free (erratum 6).
 
-    Of the linear axis, it is I w0 / c that is turned through.
+    An axis with an initial rate w0 turns by I w0 / c.
     """
 
     def _law(self) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""How far a body is turned from where it should be, about given axes, and how fast it turns on."""
+"""Attitude error and rate error about body-fixed axes."""
 
 from typing import Any
 
@@ -9,28 +9,29 @@ from mjspace.contract import Array, Measurement, Reference
 
 
 def turn(measurement: Measurement, reference: Reference, axes: Array) -> tuple[Array, Array]:
-    """Return (angle [rad], rate [rad/s]) about each of ``axes`` (m, 3), body axes, (..., m).
+    """Return the errors (angle [rad], rate [rad/s]) about each of ``axes`` (m, 3), (..., m).
 
-    The angle is the component of the shorter turn's rotation vector; the rate is the body's less
-    the wanted one.
+    ``axes`` are unit vectors in body axes. The angle is a component of the rotation vector from the
+    desired to the measured attitude, the shorter way; the rate is measured less desired.
     """
-    seen, wanted = measurement, reference
-    angle, rate = _turn.ufunc(seen.attitude, seen.rate, wanted.attitude, wanted.rate, axes)
+    angle, rate = _turn.ufunc(
+        measurement.attitude, measurement.rate, reference.attitude, reference.rate, axes
+    )
     return angle, rate
 
 
-# Written out: NumPy's calls would take 0.3 ms for one vehicle, and this takes 3 us.
+# Written out: 3 us for one vehicle, against 0.3 ms with NumPy's calls.
 @numba.guvectorize(
     ["void(f8[:],f8[:],f8[:],f8[:],f8[:,:],f8[:],f8[:])"],
     "(q),(r),(q),(r),(m,r)->(m),(m)",
     cache=True,
 )
 def _turn(
-    attitude: Any, rate: Any, wanted: Any, wanted_rate: Any, axes: Any, angle: Any, slip: Any
+    attitude: Any, rate: Any, desired: Any, desired_rate: Any, axes: Any, angle: Any, slip: Any
 ) -> None:
-    p0, p1, p2, p3 = wanted
+    p0, p1, p2, p3 = desired
     q0, q1, q2, q3 = attitude
-    # conj(p) q: from the wanted axes to the body's.
+    # conj(p) q: from the desired axes to the body's.
     w = p0 * q0 + p1 * q1 + p2 * q2 + p3 * q3
     x = p0 * q1 - p1 * q0 - p2 * q3 + p3 * q2
     y = p0 * q2 + p1 * q3 - p2 * q0 - p3 * q1
@@ -39,7 +40,7 @@ def _turn(
     scale = np.copysign(2.0, w)
     if sine > 0.0:
         scale *= np.arctan2(sine, abs(w)) / sine
-    r0, r1, r2 = wanted_rate
+    r0, r1, r2 = desired_rate
     # R^T r = r + 2 v x (v x r) - 2 w v x r
     c0, c1, c2 = y * r2 - z * r1, z * r0 - x * r2, x * r1 - y * r0
     s0 = rate[0] - r0 - 2.0 * (y * c2 - z * c1 - w * c0)

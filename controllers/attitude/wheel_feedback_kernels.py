@@ -1,7 +1,8 @@
 """The arithmetic of the lecture's wheel laws: one generalized ufunc for each, over any vehicles.
 
-Plain sums that no compiler reorders: a vehicle's numbers are the same bits alone and in a batch.
-Numba's cache does not look into other files for changes, so all that is compiled is here.
+Sums are plain loops that no compiler reorders: a vehicle's numbers are bit for bit the same alone
+and in a batch. Numba's cache does not notice changes in other files, so that all compiled functions
+are in this one.
 """
 
 # mypy: disable-error-code="no-untyped-call, call-arg"
@@ -46,7 +47,7 @@ def _wheel_momentum(w: Any, speed: Any, axes: Any, Jw: Any) -> Any:
 
 @njit
 def _reaction(u: Any, h: Any, turning: Any, torque: Any) -> None:
-    """Write -h', with h' = -u + h x turning: what the wheels' motors do to the bus."""
+    """Write the torque of the wheels' motors on the bus, -h' = u - h x turning."""
     gyro = _cross(h, turning)
     for i in range(3):
         torque[i] = u[i] - gyro[i]
@@ -62,7 +63,7 @@ def linear(
     K: Any, M: Any, axes: Any, Jw: Any, full_rate: float,
     torque: Any, a: Any, delta: Any, u: Any, h: Any,
 ) -> None:  # fmt: skip
-    """u = u_ref + K [delta, a]; ``full_rate`` is 1.0, or 0.0 for erratum 1 as printed."""
+    """u = u_ref + K [delta, a]; ``full_rate`` is 1.0, or 0.0 for h x delta (erratum 1)."""
     error = _error(q, qd)
     momentum = (_times(M, 0, wd), _times(M, 1, wd), _times(M, 2, wd))
     gyro = _cross(wd, momentum)
@@ -88,7 +89,7 @@ def quaternion(
     torque: Any, error: Any, stiffness: Any, u: Any,
     q: Any, sign_out: Any, path_out: Any, impulse_out: Any,
 ) -> None:  # fmt: skip
-    """u = -(k s q_e + c w), gains [k, c, hysteresis, period]; s changes past the hysteresis."""
+    """u = -(k s q_e + c w), gains [k, c, hysteresis, period]; s = +-1 switches with hysteresis."""
     k, c, hysteresis, period = gains
     along = q_in[0] * before[0] + q_in[1] * before[1] + q_in[2] * before[2] + q_in[3] * before[3]
     for i in range(4):

@@ -1,8 +1,8 @@
 """Attitude control with a cluster of single-gimbal CMGs: PD+ and singularity-robust steering.
 
-The attitude law is the thesis' (5.9) of ``pd_plus``, with the momentum of bus and wheels; the
-steering is ``cmg_steering``'s; the gimbals have speed loops of their own. All arrays may have
-leading vehicle axes.
+The attitude law is (5.9) of paper 001, in ``pd_plus``, with the momentum of bus and wheels. The
+steering is that of ``cmg_steering``. The gimbals' speed loops are part of the actuator. All arrays
+may have leading vehicle axes.
 """
 
 from dataclasses import dataclass
@@ -18,55 +18,55 @@ from . import cmg_steering
 
 
 class State(NamedTuple):
-    """Memory of this law: none."""
+    """Memory of this law: empty."""
 
 
 class Signals(NamedTuple):
-    """What this law shows."""
+    """Signals of this law."""
 
     sigma_e: Array
     """Attitude error, modified Rodrigues parameters, (..., 3)."""
     s: Array
     """Composite error [rad/s], body axes, (..., 3)."""
     torque: Array
-    """Wanted on the bus [N m], body axes, (..., 3)."""
+    """Commanded torque on the bus [N m], body axes, (..., 3)."""
     measure: Array
     """sqrt(det(A A^T)), zero in a singularity; at most 1.54 with four CMGs, (..., 1)."""
     damping: Array
-    """lambda of the steering: zero where it makes the wanted torque exactly, (..., 1)."""
+    """lambda of the steering: zero where the commanded torque is exact, (..., 1)."""
 
 
 @dataclass(frozen=True)
 class CmgCluster(Gains):
-    """PD+ wants the torque tau; d' = -A^T (A A^T + lambda E)^-1 tau / h0 makes it."""
+    """PD+ commands the torque tau, the gimbals turn at d' = -A^T (A A^T + lambda E)^-1 tau / h0."""
 
     batched: ClassVar[bool] = True
 
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """M: of the whole vehicle, body axes."""
     gimbal_axes: Array = gain(shape=("cmg", 3), form="unit vector")
-    """Unit, body axes."""
+    """Unit vectors, body axes, (n, 3)."""
     spin_axes: Array = gain(shape=("cmg", 3), form="unit vector")
-    """Of the wheels, unit, body axes, at gimbal angles of zero."""
+    """Of the wheels at gimbal angles of zero: unit vectors, body axes, (n, 3)."""
     wheel_inertia: Array = gain("kg m^2", ("cmg",), above=0.0)
-    """Axial, of each wheel."""
+    """Axial inertia of each wheel, (n,)."""
     attitude_gain: float = gain("1/s", default=1.0, above=0.0)
     """lam: with s = 0, sigma_e vanishes at this rate."""
     rate_gain: float = gain("N m s/rad", default=20.0, above=0.0)
     """Kc, the same on each axis."""
     momentum: float = gain("N m s", default=2.0, above=0.0)
-    """h0: of one wheel; the unit of the measure."""
+    """h0: momentum of one wheel, the scale of A."""
     measure_wanted: float = gain(default=0.5, above=0.0)
-    """m0: below it the steering gives up exactness for bounded rates."""
+    """m0: below this measure the steering bounds the rates, and the torque is not exact."""
     damping: float = gain(default=0.01, at_least=0.0)
-    """lambda0: in a singularity. Zero is the pseudo-inverse, whose rates have no bound."""
+    """lambda0: lambda in a singularity. Zero is the pseudo-inverse, with unbounded rates."""
     dither: float = gain(default=0.3, at_least=0.0, below=0.5)
-    """e0: by which the robust inverse turns to and fro, out of a locked direction. Below 0.5, E is
-    positive definite."""
+    """e0: amplitude of the dither of E, which leaves a locked direction. Below 0.5, E is positive
+    definite."""
     null_gain: float = gain("1/s", default=0.0, at_least=0.0)
-    """Of the motion that makes no torque, towards a larger measure."""
+    """Gain of the null motion towards a larger measure."""
     gimbal_rate_limit: float = gain("rad/s", default=np.inf, above=0.0, at_most=np.inf)
-    """Fastest that is asked for; all rates are lessened alike, so that the torque keeps its
+    """Largest commanded rate; all rates are scaled together, so that the torque keeps its
     direction."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
@@ -76,13 +76,13 @@ class CmgCluster(Gains):
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, GimbalRateCommand, Signals]:
-        """Return the gimbal rates and what they are made of."""
+        """Return the state, the gimbal rates [rad/s] (..., n), and the signals."""
         angle, speed = measurement.gimbal_angle, measurement.wheel_speed
-        of_wheels = cmg_steering.momentum(self._cluster, angle, speed)
-        torque, sigma_e, s = pd_plus.wanted_torque(
+        wheel_momentum = cmg_steering.momentum(self._cluster, angle, speed)
+        torque, sigma_e, s = pd_plus.commanded_torque(
             measurement.attitude,
             measurement.rate,
-            pd_plus_kernels.rigid_momentum(self.inertia, measurement.rate) + of_wheels,
+            pd_plus_kernels.rigid_momentum(self.inertia, measurement.rate) + wheel_momentum,
             reference,
             self.inertia,
             self._attitude_gains,

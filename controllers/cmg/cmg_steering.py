@@ -1,13 +1,13 @@
 """Steering of single-gimbal CMGs: a torque on the bus to gimbal rates, through singularities.
 
-CMG i turns by d about g_i of the bus and spins about s_i = s0_i cos d + (g_i x s0_i) sin d, with
-the momentum h_i = Jw W. The bus gets the torque -h0 A d', where the columns of A are (h_i / h0)
-g_i x s_i and h0 is a scale. All arrays may have leading vehicle axes.
+CMG i turns by d about the axis g_i of the bus and spins about s_i = s0_i cos d + (g_i x s0_i) sin d
+with the momentum h_i = Jw W. The torque on the bus is -h0 A d', where the columns of A are
+(h_i / h0) g_i x s_i and h0 is a scale. All arrays may have leading vehicle axes.
 
-Y. Nakamura, H. Hanafusa, "Inverse kinematic solutions with singularity robustness", 1986: lambda;
-B. Wie, D. Bailey, C. Heiberg, "Singularity robust steering logic for redundant single-gimbal
-control moment gyros", 2001: E, without which the gimbals lock where the torque is along the
-singular direction.
+Lambda: Y. Nakamura, H. Hanafusa, "Inverse kinematic solutions with singularity robustness", 1986.
+E: B. Wie, D. Bailey, C. Heiberg, "Singularity robust steering logic for redundant single-gimbal
+control moment gyros", 2001; without E the gimbals lock when the torque is along the singular
+direction.
 """
 
 # mypy: disable-error-code="no-untyped-call, call-arg"
@@ -22,14 +22,14 @@ _DITHER_RATE = 0.5 * math.pi  # rad/s, Wie et al.
 
 
 class Cluster(NamedTuple):
-    """CMGs bolted to a bus."""
+    """CMGs that are fixed to a bus."""
 
     gimbal_axes: Array
-    """g: unit, body axes, (n, 3)."""
+    """g: unit vectors, body axes, (n, 3)."""
     spin_axes: Array
-    """s0: unit, body axes, at gimbal angles of zero, (n, 3)."""
+    """s0: unit vectors, body axes, at gimbal angles of zero, (n, 3)."""
     wheel_inertia: Array
-    """Jw: axial [kg m^2], (n,)."""
+    """Jw: axial inertia of each wheel [kg m^2], (n,)."""
 
 
 def momentum(cluster: Cluster, gimbal_angle: Array, wheel_speed: Array) -> Array:
@@ -51,12 +51,13 @@ def steer(
 ) -> tuple[Array, Array, Array]:
     """Return gimbal rates (..., n) [rad/s], the measure and lambda, both (..., 1).
 
-    ``torque`` (..., 3) [N m] is wanted on the bus, body axes; ``time`` (1,) [s]; ``gains`` is
-    [h0 (N m s), m0, lambda0, e0, null gain (1/s)]. d' = -A^T (A A^T + lambda E)^-1 torque / h0,
-    plus null motion. The measure is m = sqrt(det(A A^T)); lambda = lambda0 (1 - m/m0)^2 below m0,
-    and zero above it: there d' makes the torque exactly. E is symmetric, with ones on its diagonal
-    and e0 sin(pi t/2 + phase) off it. Null motion, which makes no torque, is along the gradient of
-    m^2, times m^2 so that it is regular everywhere.
+    ``torque`` (..., 3) [N m] is the commanded torque on the bus, body axes; ``time`` (1,) [s];
+    ``gains`` is [h0 (N m s), m0, lambda0, e0, null gain (1/s)].
+
+    d' = -A^T (A A^T + lambda E)^-1 torque / h0, plus null motion. The singularity measure is
+    m = sqrt(det(A A^T)). lambda = lambda0 (1 - m/m0)^2 below m0 and zero above, where the torque is
+    exact. E is symmetric, with ones on its diagonal and e0 sin(pi t/2 + phase) off it. Null motion
+    gives no torque; it is along the gradient of m^2, times m^2 so that it is regular everywhere.
     """
     rate, measure, damping = _steer(torque, gimbal_angle, wheel_speed, *cluster, time, gains)
     return rate, measure, damping
@@ -64,7 +65,7 @@ def steer(
 
 @njit
 def _spin(g: Any, s: Any, angle: float) -> Any:
-    """Return the spin axis and its derivative by the angle."""
+    """Return the spin axis at a gimbal ``angle`` [rad] and its derivative by the angle."""
     c, d = math.cos(angle), math.sin(angle)
     x, y, z = g[1] * s[2] - g[2] * s[1], g[2] * s[0] - g[0] * s[2], g[0] * s[1] - g[1] * s[0]
     return (
@@ -75,7 +76,8 @@ def _spin(g: Any, s: Any, angle: float) -> Any:
 
 @njit
 def _adjugate(xx: float, yy: float, zz: float, yz: float, xz: float, xy: float) -> Any:
-    """Return the adjugate of a symmetric matrix, in the same order, and the determinant."""
+    """Return the adjugate of a symmetric matrix, its entries in the same order, and the
+    determinant."""
     a, b, c = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
     d, e, f = xz * xy - xx * yz, yz * xy - yy * xz, yz * xz - zz * xy
     return (a, b, c, d, e, f), xx * a + xy * f + xz * e
@@ -116,7 +118,7 @@ def _steer(
     torque: Any, angle: Any, speed: Any, g: Any, s0: Any, Jw: Any, time: Any, gains: Any,
     rate: Any, measure: Any, damping: Any,
 ) -> None:  # fmt: skip
-    h0, enough, most, e0, null_gain = gains
+    h0, m0, lambda0, e0, null_gain = gains
     xx, yy, zz, yz, xz, xy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(angle.size):
         _, t = _spin(g[i], s0[i], angle[i])
@@ -125,9 +127,9 @@ def _steer(
         xx, yy, zz = xx + x * x, yy + y * y, zz + z * z
         yz, xz, xy = yz + y * z, xz + x * z, xy + x * y
     adjugate, determinant = _adjugate(xx, yy, zz, yz, xz, xy)
-    m = math.sqrt(max(determinant, 0.0))  # rounding makes it negative where it is zero
-    lack = max(1.0 - m / enough, 0.0)
-    lam = most * lack * lack
+    m = math.sqrt(max(determinant, 0.0))  # rounding may make it negative near zero
+    lack = max(1.0 - m / m0, 0.0)
+    lam = lambda0 * lack * lack
     phase = _DITHER_RATE * time[0]
     robust, scale = _adjugate(
         xx + lam,
@@ -137,22 +139,22 @@ def _steer(
         xz + lam * e0 * math.cos(phase),
         xy - lam * e0 * math.sin(phase),
     )
-    # An exact inverse may be asked for where there is none: then the rates are not finite.
+    # With lambda0 = 0 the inverse does not exist in a singularity: the rates are then infinite.
     per_torque = -1.0 / (scale * h0) if scale != 0.0 else -math.inf
     x, y, z = _product(robust, torque)
-    wanted = (x * per_torque, y * per_torque, z * per_torque)
+    direction = (x * per_torque, y * per_torque, z * per_torque)
     measure[0], damping[0] = m, lam
     x, y, z = 0.0, 0.0, 0.0
     for i in range(angle.size):
         s, t = _spin(g[i], s0[i], angle[i])
         share = Jw[i] * speed[i] / h0
-        rate[i] = share * _dot(t, wanted)
+        rate[i] = share * _dot(t, direction)
         # The gradient of m^2 is 2 a'.adj(A A^T) a, with a' = -share s.
         ascent = -2.0 * share * share * _dot(s, _product(adjugate, t))
         rate[i] += null_gain * determinant * ascent
         x, y, z = x + share * t[0] * ascent, y + share * t[1] * ascent, z + share * t[2] * ascent
-    # What of the gradient would make a torque is taken away again.
-    made = _product(adjugate, (x, y, z))
+    # Remove the part of the gradient that gives a torque.
+    removed = _product(adjugate, (x, y, z))
     for i in range(angle.size):
         _, t = _spin(g[i], s0[i], angle[i])
-        rate[i] -= null_gain * Jw[i] * speed[i] / h0 * _dot(t, made)
+        rate[i] -= null_gain * Jw[i] * speed[i] / h0 * _dot(t, removed)

@@ -1,11 +1,10 @@
-"""The cascade that flies a satellite with a double-gimbal CMG, from attitude to volts.
+"""Cascaded control of a satellite with a double-gimbal variable-speed CMG, from attitude to volts.
 
 Attitude law, steering law, three speed loops with adaptive rejection of the wheel's vibration, and
-three current loops, for a wheel of variable speed (DGVSCMG). J. Servín Aguilar, "Control de
-orientación para satélites con compensación de vibración", UNAM 2022 (paper 001), chapter 5, with
-what it takes to fly it on bodies and hinges: the gimbals' motors hold the gyroscopic torque, which
-the thesis leaves out (E20), and each speed loop has the inertia that its motor turns (E19). All
-arrays may have leading vehicle axes.
+three current loops. J. Servín Aguilar, "Control de orientación para satélites con compensación de
+vibración", UNAM 2022 (paper 001), chapter 5. Additions for multibody physics: the gimbals' motors
+hold the gyroscopic torque, which the thesis neglects (E20), and each speed loop has the inertia
+that its motor turns (E19). All arrays may have leading vehicle axes.
 """
 
 from dataclasses import dataclass
@@ -23,10 +22,10 @@ from . import steering
 
 
 class State(NamedTuple):
-    """What the motors' loops remember; the attitude and steering laws remember nothing."""
+    """Memory of the motors' loops; the attitude and steering laws have none."""
 
     wheel_wanted: Array
-    """Wanted speed of the wheel about its axis, with what carries it [rad/s], (..., 1)."""
+    """Desired absolute speed of the wheel about its axis [rad/s], (..., 1)."""
     speed_memory: Array
     """Of the speed loops, (..., 3, 9)."""
     voltage_integral: Array
@@ -34,34 +33,33 @@ class State(NamedTuple):
 
 
 class SpeedCommand(NamedTuple):
-    """What the attitude loop asks of the motors' loops, for its period."""
+    """Command of the attitude loop to the motors' loops, for one period."""
 
     gimbal_rate: Annotated[Array, Unit("rad/s")]
-    """[rad/s], outer and inner, (..., 2)."""
+    """Desired rates of outer and inner gimbal [rad/s], (..., 2)."""
     acceleration: Annotated[Array, Unit("rad/s^2")]
-    """Of each hinge [rad/s^2], (..., 3); the gimbals' is left at zero, the wheel's is wanted."""
+    """Desired acceleration of each hinge [rad/s^2], (..., 3); zero for the gimbals."""
     load: Annotated[Array, Unit("N m")]
-    """Gyroscopic torque that each motor is to hold [N m], (..., 3); none on the wheel's."""
+    """Gyroscopic torque that each motor has to hold [N m], (..., 3); zero for the wheel's."""
 
 
 class Signals(NamedTuple):
-    """What the cascade shows."""
+    """Signals of the cascade."""
 
     sigma_e: Array
     """Attitude error, modified Rodrigues parameters, (..., 3)."""
     s: Array
     """Composite error [rad/s], body axes, (..., 3)."""
     torque: Array
-    """Wanted on the bus [N m], body axes, (..., 3)."""
+    """Commanded torque on the bus [N m], body axes, (..., 3)."""
     authority: Array
     """Jw |W cos(di)| [N m s], zero where the steering is singular, (..., 1)."""
     speed_error: Array
-    """Wanted less measured speed of each hinge [rad/s], the wheel's with what carries it,
-    (..., 3)."""
+    """Desired less measured speed of each hinge [rad/s], the wheel's absolute, (..., 3)."""
     vibration_hat: Array
-    """Believed vibration torque on the wheel [N m], (..., 1)."""
+    """Estimated vibration torque on the wheel [N m], (..., 1)."""
     phi_hat: Array
-    """Believed square of the vibration's cycles in a turn, (..., 1)."""
+    """Estimate of psi^2, the square of the vibration's cycles per revolution, (..., 1)."""
 
 
 @dataclass(frozen=True)
@@ -85,23 +83,24 @@ class Cascade(Gains):
     disturbance_bound: float = gain("N m", default=0.05, at_least=0.0)
     """tbar: largest norm of the disturbance."""
     smoothing: float = gain("W", default=1e-6, above=0.0)
-    """eps: what the relay of the disturbance's compensation may lose to smoothness."""
+    """eps: smoothing of the relay that compensates the disturbance; see ``pd_plus.Robust``."""
     steering_damping: float = gain(default=0.01, at_least=0.0)
-    """g0: cos(di) at which the steering loses half."""
+    """g0: cos(di) at which the damping halves the outer gimbal's rate."""
     momentum_damping: float = gain("N m s", default=0.01, at_least=0.0)
-    """Of the wheel, at which the gimbals' rates lose half, ours."""
+    """Momentum of the wheel at which the damping halves the gimbals' rates; not in the thesis."""
     gimbal_rate_limit: float = gain("rad/s", default=inf, above=0.0, at_most=inf)
-    """Fastest that is asked for, ours: beyond it the torque across the wheel's axis is less."""
+    """Largest commanded rate; it limits the torque perpendicular to the spin axis. Not in the
+    thesis."""
     wheel_acceleration_limit: float = gain("rad/s^2", default=inf, above=0.0, at_most=inf)
-    """Largest that is asked for, ours."""
+    """Largest commanded acceleration; not in the thesis."""
     gyroscopic_feedforward: float = gain(default=1.0, at_least=0.0, at_most=1.0)
-    """Share of the gyroscopic torque that the gimbals' motors are told of; the thesis has 0."""
+    """Share of the gyroscopic torque that is fed forward to the gimbals' motors; thesis: 0."""
     turned_inertia: Array = gain("kg m^2", (3,), default=(0.018, 0.017, 0.016), above=0.0)
-    """J that each motor turns: outer gimbal, inner gimbal, wheel."""
+    """J: inertia that each motor turns: outer gimbal, inner gimbal, wheel."""
     speed_gain: Array = gain("N m s/rad", (3,), default=(2.0, 2.0, 0.32), above=0.0)
     """k_p."""
     integral_gain: Array = gain("N m/rad", (3,), default=(0.0, 0.0, 0.0), at_least=0.0)
-    """k_i, ours."""
+    """k_i; not in the thesis."""
     observer_gain: Array = gain("N m s/rad", (3,), default=(0.0, 0.0, 1.0), at_least=0.0)
     """k_o."""
     vibration_gain: Array = gain("N m/rad", (3,), default=(0.0, 0.0, 5.0), at_least=0.0)
@@ -109,11 +108,12 @@ class Cascade(Gains):
     adaptation_gain: Array = gain("1/(N m)^2", (3,), default=(0.0, 0.0, 1.0), at_least=0.0)
     """k_a."""
     vibration_limit: Array = gain("N m", (3,), default=3 * (inf,), at_least=0.0, at_most=inf)
-    """Largest vibration that is believed, ours: a rejection gone astray does no more than this."""
+    """Largest amplitude of the estimated vibration: bounds the torque of the rejection. Not in the
+    thesis."""
     current_limit: Array = gain("A", (3,), default=3 * (inf,), above=0.0, at_most=inf)
-    """Largest wanted I_q."""
+    """Largest commanded I_q."""
     speed_steps: int = gain(default=1, at_least=1, whole=True)
-    """Inner periods in one of the speed loops; the current loops have every one."""
+    """Inner periods in one period of the speed loops; the current loops run in each."""
     current_gain: float = gain("1/s", default=3000.0, above=0.0)
     """k_ep; k_ei is k_ep R/L."""
     pole_pairs: Array = gain(shape=(3,), default=(4.0, 4.0, 6.0), at_least=1, whole=True)
@@ -134,10 +134,10 @@ class Cascade(Gains):
             raise ValueError(f"speed_steps: got {self.speed_steps}, should divide {ratio}")
 
     def _refuse_unstable(self) -> None:
-        _ = self._speed_loop, self._current_loop  # which refuse unstable gains
+        _ = self._speed_loop, self._current_loop  # refuse unstable gains
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
-        """Return the state that wants the wheel as fast as it is and believes in no vibration."""
+        """Return the initial state: the wheel keeps its speed, no vibration is estimated."""
         speed, carried = _speeds(measurement), _carried(measurement)
         return State(
             (speed + carried)[..., 2:],
@@ -148,9 +148,9 @@ class Cascade(Gains):
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, SpeedCommand, Signals]:
-        """Return the gimbals' rates and the wheel's acceleration for the wanted torque."""
+        """Return the gimbals' rates and the wheel's acceleration for the commanded torque."""
         angle, wheel_speed = measurement.gimbal_angle, measurement.wheel_speed
-        torque, sigma_e, s = pd_plus.wanted_torque(
+        torque, sigma_e, s = pd_plus.commanded_torque(
             measurement.attitude,
             measurement.rate,
             steering.momentum(
@@ -176,34 +176,34 @@ class Cascade(Gains):
             np.concatenate([still, eta[..., 2:]], axis=-1),
             np.concatenate([self.gyroscopic_feedforward * load, none], axis=-1),
         )
-        believed = motor_loops.estimates(state.speed_memory[..., 2:, :])
-        wanted = np.concatenate([command.gimbal_rate, state.wheel_wanted], axis=-1)
-        error = wanted - _speeds(measurement) - _carried(measurement)
-        shown = Signals(sigma_e, s, torque, authority, error, believed.z1_hat, believed.phi_hat)
-        return state, command, shown
+        found = motor_loops.estimates(state.speed_memory[..., 2:, :])
+        desired = np.concatenate([command.gimbal_rate, state.wheel_wanted], axis=-1)
+        error = desired - _speeds(measurement) - _carried(measurement)
+        signals = Signals(sigma_e, s, torque, authority, error, found.z1_hat, found.phi_hat)
+        return state, command, signals
 
     def inner(
         self, state: State, time: float, command: SpeedCommand, measurement: Measurement
     ) -> tuple[State, VoltageCommand]:
-        """Return the motors' voltages for the wanted speeds."""
+        """Return the motors' voltages for the desired speeds."""
         speed = _speeds(measurement)
-        memory, ahead = state.speed_memory, state.wheel_wanted
+        memory, wheel_speed = state.speed_memory, state.wheel_wanted
         if round(time / self.inner_period) % self.speed_steps == 0:
             memory, _ = self._speed_loop.step(
                 memory,
                 measurement.current,
                 speed,
-                np.concatenate([command.gimbal_rate, ahead], axis=-1),
+                np.concatenate([command.gimbal_rate, wheel_speed], axis=-1),
                 command.acceleration,
                 command.load,
                 _carried(measurement),
             )
-            ahead = ahead + self._speed_loop.period * command.acceleration[..., 2:]
+            wheel_speed = wheel_speed + self._speed_loop.period * command.acceleration[..., 2:]
         current = motor_loops.held_current(memory)
         integral, voltage = self._current_loop.step(
             state.voltage_integral, measurement.current, current, speed
         )
-        return State(ahead, memory, integral), VoltageCommand(voltage)
+        return State(wheel_speed, memory, integral), VoltageCommand(voltage)
 
     @cached_property
     def _attitude_gains(self) -> Array:
@@ -247,6 +247,6 @@ def _speeds(measurement: Measurement) -> Array:
     return np.concatenate([measurement.gimbal_rate, measurement.wheel_speed], axis=-1)
 
 
-def _carried(seen: Measurement) -> Array:
-    """Return how fast each rotor's carrier turns about its axis [rad/s], (..., 3)."""
-    return steering.carried(seen.rate, seen.gimbal_angle, seen.gimbal_rate)
+def _carried(measurement: Measurement) -> Array:
+    """Return the rate of each rotor's carrier about the rotor's axis [rad/s], (..., 3)."""
+    return steering.carried(measurement.rate, measurement.gimbal_angle, measurement.gimbal_rate)

@@ -1,12 +1,12 @@
-"""The double-gimbal CMG as the thesis models it: three motors that nothing holds back.
+"""The double-gimbal CMG as the thesis models it: three independent motors.
 
 J. Servín Aguilar, "Control de orientación para satélites con compensación de vibración", UNAM 2022
-(paper 001), section 5.2: each motor turns its own inertia, J W' = k_m I_q + z1 (5.4), with a
-current that is at once what is wanted, and the bus is given -chi eta. Neither the gyroscopic torque
-on the gimbals' motors is in it (E20) nor the inertia that they carry (E19). The law integrates this
-model and asks ideal thrusters on a rigid bus for its torque: so the thesis' cascade does what it
-says. On bodies and hinges it does not (scenario ``dgvscmg-thesis``). All arrays may have leading
-vehicle axes.
+(paper 001), section 5.2: each motor turns its own inertia, J W' = k_m I_q + z1 (5.4), with an ideal
+current loop, and the torque on the bus is -chi eta. The model neglects the gyroscopic torque on the
+gimbals' motors (E20) and the inertia that they carry (E19). The law integrates it and commands its
+torque from ideal thrusters on a rigid bus, which reproduces the thesis' results. On multibody
+physics the thesis' cascade fails (scenario ``dgvscmg-thesis``). All arrays may have leading vehicle
+axes.
 """
 
 # mypy: disable-error-code="no-untyped-call, call-arg"
@@ -25,100 +25,99 @@ from . import dgvscmg
 
 
 class State(NamedTuple):
-    """Of the modelled CMG, outer gimbal, inner gimbal and wheel, and of its speed loops."""
+    """State of the modelled CMG (outer gimbal, inner gimbal, wheel) and of its speed loops."""
 
     angle: Array
-    """[rad], (..., 3)."""
+    """Hinge angles [rad], (..., 3)."""
     speed: Array
-    """[rad/s], (..., 3)."""
+    """Hinge rates [rad/s], (..., 3)."""
     wanted: Array
-    """Wanted speeds [rad/s], (..., 3)."""
+    """Desired hinge rates [rad/s], (..., 3)."""
     speed_memory: Array
     """Of the speed loops, (..., 3, 9)."""
     given: Array
-    """-chi eta in the last inner period [N m], body axes, (..., 3)."""
+    """Torque -chi eta of the last inner period [N m], body axes, (..., 3)."""
 
 
 class Signals(NamedTuple):
-    """What the law shows of its cascade and of the CMG that it models."""
+    """Signals of the cascade and of the modelled CMG."""
 
     sigma_e: Array
     """Attitude error, modified Rodrigues parameters, (..., 3)."""
     torque: Array
-    """Wanted on the bus [N m], body axes, (..., 3)."""
+    """Commanded torque on the bus [N m], body axes, (..., 3)."""
     torque_error: Array
-    """What the CMG gave just before, less that [N m], (..., 3)."""
+    """Torque of the CMG in the last inner period, less the commanded one [N m], (..., 3)."""
     authority: Array
     """Jw |W cos(di)| [N m s], (..., 1)."""
     gimbal_angle: Array
-    """[rad], outer and inner, (..., 2)."""
+    """Outer and inner [rad], (..., 2)."""
     gimbal_rate: Array
-    """[rad/s], (..., 2)."""
+    """Outer and inner [rad/s], (..., 2)."""
     wheel_speed: Array
     """[rad/s], (..., 1)."""
     vibration_hat: Array
-    """Believed vibration torque on the wheel [N m], (..., 1)."""
+    """Estimated vibration torque on the wheel [N m], (..., 1)."""
     phi_hat: Array
-    """Believed square of the vibration's cycles in a turn, (..., 1)."""
+    """Estimate of psi^2, the square of the vibration's cycles per revolution, (..., 1)."""
 
 
 @dataclass(frozen=True)
 class Algebraic(dgvscmg.Cascade):
-    """The ``Cascade`` on the thesis' actuator instead of motors, gimbals and a wheel.
+    """The ``Cascade`` on the thesis' actuator model instead of motors, gimbals and a wheel.
 
-    ``turned_inertia`` is what its motors turn. In place of W*', which the thesis needs for the
-    gimbals and does not say how to get (E27), their wanted rates go straight from one of the
-    attitude law's to the next, a period behind.
+    The thesis needs W*' for the gimbals and does not define it (E27). Here the desired rates are
+    interpolated linearly from one command of the attitude law to the next, a period late.
     """
 
     start_speed: float = gain("rad/s", default=73.0)
-    """Of the wheel; Table 5.1 has 5 (E22)."""
+    """Initial speed of the wheel; Table 5.1 has 5 (E22)."""
     vibration: Array = gain(shape=(3,), default=(0.35, 0.5, 3.0))
-    """Of the wheel (4.3): amplitude [N m], cycles in a turn, phase [rad]."""
+    """Vibration of the wheel (4.3): amplitude [N m], cycles per revolution, phase [rad]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not np.all(self.vibration[:2] >= 0.0):
             raise ValueError(
-                f"vibration: got {self.vibration.tolist()}, should begin with 0 or more twice"
+                f"vibration: got {self.vibration.tolist()}, its first two should be 0 or more"
             )
 
     def _refuse_unstable(self) -> None:
         _ = self._speed_loop  # there is no current loop
 
     def reset(self, measurement: Measurement, reference: Reference) -> Any:
-        """Return the state whose gimbals are at zero and at rest."""
+        """Return the initial state: gimbals at zero and at rest."""
         zero = np.zeros_like(measurement.rate)
         speed = zero + np.array([0.0, 0.0, self.start_speed])
         state = State(zero, speed, speed, self._speed_loop.reset(speed), zero)
-        _, command, _ = self._asked(state, 0.0, measurement, reference)
-        wanted = np.concatenate([command.gimbal_rate, speed[..., 2:]], axis=-1)
-        return state._replace(wanted=wanted)
+        _, command, _ = self._cascaded(state, 0.0, measurement, reference)
+        desired = np.concatenate([command.gimbal_rate, speed[..., 2:]], axis=-1)
+        return state._replace(wanted=desired)
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[Any, dgvscmg.SpeedCommand, Any]:
-        """Return the accelerations that bring the gimbals to their rates, and the wheel's."""
-        _, command, shown = self._asked(state, time, measurement, reference)
+        """Return the command with the accelerations that bring the gimbals to their rates."""
+        _, command, own = self._cascaded(state, time, measurement, reference)
         slope = (command.gimbal_rate - state.wanted[..., :2]) / self.control_period
         acceleration = np.concatenate([slope, command.acceleration[..., 2:]], axis=-1)
         signals = Signals(
-            shown.sigma_e,
-            shown.torque,
-            state.given - shown.torque,
-            shown.authority,
+            own.sigma_e,
+            own.torque,
+            state.given - own.torque,
+            own.authority,
             state.angle[..., :2],
             state.speed[..., :2],
             state.speed[..., 2:],
-            shown.vibration_hat,
-            shown.phi_hat,
+            own.vibration_hat,
+            own.phi_hat,
         )
         return state, command._replace(acceleration=acceleration), signals
 
     def inner(
         self, state: Any, time: float, command: dgvscmg.SpeedCommand, measurement: Measurement
     ) -> tuple[Any, Any]:
-        """Return the torque on the bus [N m], body axes, and the CMG a moment later."""
+        """Return the CMG's state an inner period later, and the torque on the bus [N m]."""
         q = motor_loops.held_current(state.speed_memory)
         memory, current = self._speed_loop.step(
             state.speed_memory,
@@ -128,16 +127,16 @@ class Algebraic(dgvscmg.Cascade):
             command.acceleration,
             np.zeros_like(q),
         )
-        angle, speed, given, torque = _turned.ufunc(
+        angle, speed, output, torque = _advance.ufunc(
             state.angle, state.speed, self.torque_constant * current, measurement.rate, self._model
         )
-        wanted = state.wanted + self.inner_period * command.acceleration
-        return State(angle, speed, wanted, memory, given), TorqueCommand(torque)
+        desired = state.wanted + self.inner_period * command.acceleration
+        return State(angle, speed, desired, memory, output), TorqueCommand(torque)
 
-    def _asked(
+    def _cascaded(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[Any, dgvscmg.SpeedCommand, dgvscmg.Signals]:
-        """Return what the cascade asks where the modelled CMG is."""
+        """Return the cascade's step with the measurements of the modelled CMG."""
         modelled = measurement._replace(
             gimbal_angle=state.angle[..., :2],
             gimbal_rate=state.speed[..., :2],
@@ -148,7 +147,7 @@ class Algebraic(dgvscmg.Cascade):
 
     @cached_property
     def _speed_loop(self) -> motor_loops.SpeedLoop:
-        # No current loop lags; a current is held for one inner period.
+        # Without a current loop the only lag is the current held for one inner period.
         return replace(super()._speed_loop, lead=0.5 * self.inner_period)
 
     @cached_property
@@ -162,14 +161,14 @@ class Algebraic(dgvscmg.Cascade):
     "(m),(m),(m),(m),(g)->(m),(m),(m),(m)",
     cache=True,
 )
-def _turned(
+def _advance(
     angle: Any, speed: Any, drive: Any, rate: Any, model: Any,
-    angle_out: Any, speed_out: Any, given: Any, torque: Any,
+    angle_out: Any, speed_out: Any, output: Any, torque: Any,
 ) -> None:  # fmt: skip
-    """Turn the hinges for a period by the midpoint rule; ``drive`` is k_m I_q [N m].
+    """Advance the hinges by a period with the midpoint rule; ``drive`` is k_m I_q [N m].
 
-    Model: [period, Jw, vibration's amplitude, cycles and phase, J1, J2, J3]. ``given`` is -chi eta
-    at the midpoint (2.55), ``torque`` with (Jw W s) x w, which turns a bus that carries the wheel.
+    Model: [period, Jw, vibration's amplitude, cycles and phase, J1, J2, J3]. ``output`` is -chi eta
+    at the midpoint (2.55); ``torque`` adds (Jw W s) x w, since the rigid bus has no wheel.
     """
     period, Jw = model[0], model[1]
     middle = angle[2] + 0.5 * period * speed[2]
@@ -185,9 +184,9 @@ def _turned(
     inner = spin * 0.5 * (speed[1] + speed_out[1])
     wheel = Jw * (drive[2] + vibration) / model[7]
     sx, sy, sz = co * ci, so * ci, -si
-    given[0] = so * outer + co * si * inner - sx * wheel
-    given[1] = -co * outer + so * si * inner - sy * wheel
-    given[2] = ci * inner - sz * wheel
-    torque[0] = given[0] + spin * (sy * rate[2] - sz * rate[1])
-    torque[1] = given[1] + spin * (sz * rate[0] - sx * rate[2])
-    torque[2] = given[2] + spin * (sx * rate[1] - sy * rate[0])
+    output[0] = so * outer + co * si * inner - sx * wheel
+    output[1] = -co * outer + so * si * inner - sy * wheel
+    output[2] = ci * inner - sz * wheel
+    torque[0] = output[0] + spin * (sy * rate[2] - sz * rate[1])
+    torque[1] = output[1] + spin * (sz * rate[0] - sx * rate[2])
+    torque[2] = output[2] + spin * (sx * rate[1] - sy * rate[0])

@@ -1,9 +1,9 @@
-"""The cascade of the double-gimbal CMG, whose wheel thrusters bring back to its bias speed.
+"""The cascade of the double-gimbal CMG, with unloading of its wheel by thrusters.
 
-A disturbance with a bias brings momentum until the wheel turns faster than its motor can. The
-thesis (paper 001) models no unloading; this is ours. Thrusters give the bus -k Jw (W - W0) s, along
-the wheel's axis s, and the wheel takes it up: its acceleration changes by -k (W - W0), the gimbals'
-rates by nothing, and the bus feels neither.
+A biased disturbance adds momentum until the wheel is saturated. The thesis (paper 001) has no
+unloading. Here thrusters give the torque -k Jw (W - W0) s along the spin axis s, and the wheel
+compensates it: its acceleration changes by -k (W - W0), the gimbal rates stay, and the net torque
+on the bus is zero.
 """
 
 from dataclasses import dataclass
@@ -17,45 +17,45 @@ from . import dgvscmg, steering
 
 
 class Command(NamedTuple):
-    """What the attitude loop asks of the motors' loops and the thrusters, for its period."""
+    """Command of the attitude loop to the motors' loops and the thrusters, for one period."""
 
     gimbal_rate: Annotated[Array, Unit("rad/s")]
     acceleration: Annotated[Array, Unit("rad/s^2")]
     load: Annotated[Array, Unit("N m")]
-    """These three as ``dgvscmg.SpeedCommand`` has them."""
+    """These three as in ``dgvscmg.SpeedCommand``."""
     thruster_torque: Annotated[Array, Unit("N m")]
     """On the bus, body axes [N m], (..., 3)."""
 
 
 class MotorCommand(NamedTuple):
-    """What the inner loop asks of inverters and thrusters."""
+    """Command of the inner loop to inverters and thrusters."""
 
     voltage: Annotated[Array, Unit("V")]
-    """As ``VoltageCommand`` has it [V], (..., 3, 2)."""
+    """As in ``VoltageCommand`` [V], (..., 3, 2)."""
     thruster_torque: Annotated[Array, Unit("N m")]
     """On the bus, body axes [N m], (..., 3)."""
 
 
 @dataclass(frozen=True)
 class Unloading(dgvscmg.Cascade):
-    """The ``Cascade`` that holds its wheel near a speed."""
+    """The ``Cascade`` with unloading of the wheel towards a bias speed."""
 
     bias_speed: float = gain("rad/s", default=73.0)
     """W0."""
     unloading_gain: float = gain("1/s", default=0.1, at_least=0.0)
-    """k: slower than the manoeuvre, whose momentum the thrusters would give and take else."""
+    """k: should be slower than the manoeuvre, or the thrusters exchange its momentum, too."""
     thruster_limit: float = gain("N m", default=0.1, at_least=0.0, at_most=np.inf)
-    """Largest torque that is asked of the thrusters."""
+    """Largest commanded torque of the thrusters."""
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[Any, Any, dgvscmg.Signals]:
-        """Return the cascade's command with what unloads the wheel."""
-        state, command, shown = super().step(state, time, measurement, reference)
+        """Return the cascade's command with the unloading added."""
+        state, command, signals = super().step(state, time, measurement, reference)
         Jw, angle = self.rotor_inertia, measurement.gimbal_angle
-        wanted = -self.unloading_gain * (measurement.wheel_speed - self.bias_speed)
+        unlimited = -self.unloading_gain * (measurement.wheel_speed - self.bias_speed)
         most = self.thruster_limit / Jw
-        slowing = np.minimum(np.maximum(wanted, -most), most)
+        slowing = np.minimum(np.maximum(unlimited, -most), most)
         along = steering.torque_matrix(angle, measurement.wheel_speed, Jw)[..., 2]  # Jw s
         eta = np.concatenate([np.zeros_like(angle), slowing], axis=-1)
         # The outer gimbal's motor holds its part of the wheel's acceleration.
@@ -69,11 +69,11 @@ class Unloading(dgvscmg.Cascade):
             command.load + held,
             slowing * along,
         )
-        return state, unloading, shown
+        return state, unloading, signals
 
     def inner(
         self, state: Any, time: float, command: Any, measurement: Measurement
     ) -> tuple[Any, Any]:
-        """Return the motors' voltages, and the thrusters' torque for as long as it is held."""
+        """Return the motors' voltages, and the thrusters' torque as last commanded."""
         state, motors = super().inner(state, time, command, measurement)
         return state, MotorCommand(motors.voltage, command.thruster_torque)

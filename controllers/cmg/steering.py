@@ -1,13 +1,14 @@
 """Steering of a double-gimbal variable-speed control moment gyro (DGVSCMG): torque to gimbal rates.
 
-The outer gimbal turns by do about +z of the bus, the inner by di about +y of the outer, the wheel
-spins at W about +x of the inner, s; all through one point. In bus axes, with t = s x gi:
+The outer gimbal turns by do about +z of the bus, the inner one by di about +y of the outer. The
+wheel spins at W about s, +x of the inner gimbal. All axes meet in one point. In bus axes, with
+t = s x gi:
 
     s = (co ci, so ci, -si)   gi = (-so, co, 0)   t = (co si, so si, ci)   go = (0, 0, 1)
 
-The columns are those of a rotation (E3: the printed second is not a unit vector). The momentum
-Jw W s gives the bus the torque -chi eta, eta = (do', di', W'), and chi loses rank at di = +-90 deg,
-where the outer gimbal turns the wheel about its own axis. J. Servín Aguilar, "Control de
+(s, gi, t) is a rotation matrix (E3: the printed second column is not a unit vector). The torque on
+the bus is -chi eta with eta = (do', di', W'). chi is singular at di = +-90 deg, where the outer
+gimbal's axis is along the spin axis. J. Servín Aguilar, "Control de
 orientación para satélites con compensación de vibración", UNAM 2022 (paper 001), section 5.1. All
 arrays may have leading vehicle axes.
 """
@@ -47,15 +48,15 @@ def steer(
 ) -> tuple[Array, Array]:
     """Return eta = -chi^-1 torque (..., 3), as do', di' [rad/s], W' [rad/s^2], and the authority.
 
-    ``torque`` (..., 3) [N m] is wanted on the bus, body axes; the others are as in
-    ``torque_matrix``. Ours, in place of the printed gamma (E17): the 1/cos(di) of (5.8) is damped
-    to cos(di) / (cos(di)^2 + damping^2). That is regular at every di, keeps its sign, and is at
-    most 1/(2 damping); at the default it loses 25 % of do' at 1 deg from the singularity, 0.3 % at
-    10 deg. The momentum's 1/(Jw W) is damped alike, by ``momentum_damping`` [N m s]; without it the
-    rates are infinite or not a number at W = 0.
+    ``torque`` (..., 3) [N m] is the commanded torque on the bus, body axes; the others are as in
+    ``torque_matrix``. The printed gamma (E17) is replaced: 1/cos(di) of (5.8) is damped to
+    cos(di) / (cos(di)^2 + damping^2), which is regular at every di, keeps its sign, and is at most
+    1/(2 damping). The default reduces do' by 25 % at 1 deg from the singularity, by 0.3 % at
+    10 deg. 1/(Jw W) is damped alike, by ``momentum_damping`` [N m s]; without it the rates are
+    infinite or NaN at W = 0.
 
-    The authority (..., 1) measures how near that is: Jw |W cos(di)| [N m s], the torque about gi
-    for each rad/s of the outer gimbal.
+    The authority (..., 1) is the distance from the singularity, Jw |W cos(di)| [N m s]: the torque
+    about gi per rad/s of the outer gimbal.
     """
     eta, authority = _steer(
         torque, gimbal_angle, wheel_speed, wheel_inertia, damping, momentum_damping
@@ -71,12 +72,12 @@ def steer_as_printed(
     gamma_0: float = 0.01,
     zeta: float = 10.0,
 ) -> tuple[Array, Array]:
-    """Return what ``steer`` does, by (5.8) as printed, to show that it cannot fly (E17).
+    """Return eta and the authority as ``steer``, by (5.8) as printed, which cannot be flown (E17).
 
-    It has 1/(cos(di) + gamma), gamma = gamma_0 exp(zeta cos(di)^2) sin(di). The sign of zeta is
-    wrong: gamma is 17.8 at 5 deg, where 5 % of do' are left; the denominator is zero at -0.26 and
-    at -47.8 deg, and in between the command is reversed. With ``zeta`` = -10, as the text means it,
-    it is zero at -89.43 and 90.57 deg.
+    (5.8) has 1/(cos(di) + gamma), gamma = gamma_0 exp(zeta cos(di)^2) sin(di). The sign of zeta is
+    wrong: at 5 deg gamma is 17.8, which leaves 5 % of do'. The denominator is zero at -0.26 and at
+    -47.8 deg, and the command is reversed in between. With ``zeta`` = -10, as the text intends, it
+    is zero at -89.43 and 90.57 deg.
     """
     eta, authority = _steer_as_printed(
         torque, gimbal_angle, wheel_speed, wheel_inertia, gamma_0, zeta
@@ -85,11 +86,11 @@ def steer_as_printed(
 
 
 def within(eta: Array, limits: Array) -> Array:
-    """Return ``eta`` (..., 3) with no component beyond its of the ``limits`` (3,).
+    """Return ``eta`` (..., 3) with each component within its limit of ``limits`` (3,).
 
-    The gimbals are slowed down together, so that the torque across the wheel's axis keeps its
-    direction; what is along the axis the wheel gives whatever the gimbals can do, or a wheel that
-    nearly stands would stay so.
+    Both gimbal rates are scaled together, so that the torque perpendicular to the spin axis keeps
+    its direction. The wheel's acceleration is limited independently: otherwise a wheel at a low
+    speed could not be accelerated.
     """
     excess = np.abs(eta) / limits
     gimbals = np.max(excess[..., :2], axis=-1, keepdims=True)
@@ -107,25 +108,26 @@ def momentum(
 
 
 def carried(rate: Array, gimbal_angle: Array, gimbal_rate: Array) -> Array:
-    """Return how fast the hinges' axes are carried round [rad/s], (..., 3): the wheel's alone.
+    """Return the rate of each hinge's carrier about the hinge axis [rad/s], (..., 3).
 
-    It is s . w - do' sin(di), with the bus's ``rate`` (..., 3). A motor that turns the wheel by u
-    on that axis gives Jw (W + carried)' = u, exactly; the thesis has Jw W' = u.
+    It is zero for the gimbals, and s . w - do' sin(di) for the wheel, with the bus's ``rate``
+    (..., 3). A motor torque u on the wheel gives exactly Jw (W + carried)' = u; the thesis has
+    Jw W' = u.
     """
-    given: Array = _carried.ufunc(rate, gimbal_angle, gimbal_rate)  # asked every inner period
-    return given
+    rates: Array = _carried.ufunc(rate, gimbal_angle, gimbal_rate)
+    return rates
 
 
 def gimbal_load(
     rate: Array, gimbal_angle: Array, eta: Array, wheel_speed: Array, wheel_inertia: float
 ) -> Array:
-    """Return what the motors of the outer and the inner gimbal must hold (..., 2) [N m].
+    """Return the load torques on the motors of outer and inner gimbal (..., 2) [N m].
 
-    A wheel that is turned and spun up needs (w + do' go + di' gi) x Jw W s + Jw W' s, and its
-    gimbals carry it, along go and gi: in a double gimbal they bear the whole output torque. The
-    thesis' speed loops leave it out (E20), and diverge. ``rate`` (..., 3) [rad/s] is the bus's, in
-    body axes; ``eta`` (..., 3) is do', di' [rad/s], W' [rad/s^2], commanded or measured; the others
-    are as in ``torque_matrix``. It is exact for a wheel of three equal inertias.
+    The wheel needs the torque (w + do' go + di' gi) x Jw W s + Jw W' s; its components along go and
+    gi act on the gimbals' motors, which in a double gimbal carry the whole output torque. The
+    thesis' speed loops neglect it (E20) and diverge. ``rate`` (..., 3) [rad/s] is the bus's, body
+    axes; ``eta`` (..., 3) is do', di' [rad/s], W' [rad/s^2], commanded or measured; the others are
+    as in ``torque_matrix``. Exact for a wheel of three equal inertias.
     """
     load: Array = _gimbal_load(rate, gimbal_angle, eta, wheel_speed, wheel_inertia)
     return load
@@ -152,11 +154,11 @@ def _rates(torque: Any, angle: Any, per_h: float, Jw: float, inverse: float, eta
     eta[2] = -_dot(s, torque) / Jw
 
 
-_GIVEN = "(v),(g),(n),()"  # torque or rate, gimbal angles, wheel speed, wheel inertia
+_INPUTS = "(v),(g),(n),()"  # torque or rate, gimbal angles, wheel speed, wheel inertia
 
 
 @guvectorize(
-    ["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_GIVEN},(),()->(v),(n)", cache=True
+    ["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_INPUTS},(),()->(v),(n)", cache=True
 )
 def _steer(
     torque: Any, angle: Any, speed: Any, Jw: Any, damping: Any, h0: Any, eta: Any, authority: Any
@@ -168,7 +170,7 @@ def _steer(
 
 
 @guvectorize(
-    ["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_GIVEN},(),()->(v),(n)", cache=True
+    ["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_INPUTS},(),()->(v),(n)", cache=True
 )
 def _steer_as_printed(
     torque: Any, angle: Any, speed: Any, Jw: Any, gamma_0: Any, zeta: Any, eta: Any, authority: Any

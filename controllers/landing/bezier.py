@@ -8,9 +8,10 @@ from mjspace.contract import Array
 
 
 def curve(points: Array, duration: float, s: Array) -> list[Array]:
-    """Return a Bezier curve and its first four derivatives by time at ``s``, 0 to 1: (n, 3) each.
+    """Return a Bezier curve and its first four time derivatives at ``s`` (n,), each (n, 3) [m/s^k].
 
-    ``points`` (k, 3) [m] are passed in ``duration`` [s].
+    ``points`` (k, 3) [m] are the control points, ``duration`` [s] the time of the whole curve, and
+    ``s`` the fraction of it that has elapsed, 0 to 1.
     """
     found, corners = [], points
     for _ in range(5):
@@ -20,6 +21,6 @@ def curve(points: Array, duration: float, s: Array) -> list[Array]:
 
 
 def bernstein(degree: int, s: Array) -> Array:
-    """Return Bernstein's polynomials at ``s`` (n,), shape (n, degree + 1)."""
+    """Return the Bernstein polynomials of a degree at ``s`` (n,), shape (n, degree + 1)."""
     terms = [comb(degree, k) * s**k * (1.0 - s) ** (degree - k) for k in range(degree + 1)]
     return np.stack(terms, axis=-1)

@@ -1,7 +1,7 @@
-"""The least sum of vectors' lengths under second-order cones, by a barrier method.
+"""Minimizes a sum of vector lengths under second-order cone constraints, by a barrier method.
 
-Its sums and its elimination are NumPy's own loops, never BLAS: the last bit of a product of BLAS
-depends on the number of threads, and a search can turn that into another answer.
+Sums and the elimination are NumPy's own loops, not BLAS: the last bit of a BLAS product depends on
+the number of threads, and a search can amplify it to a different solution.
 """
 
 from typing import NamedTuple
@@ -11,17 +11,19 @@ import numpy as np
 from mjspace.contract import Array
 
 PENALTY = 100.0
-"""Cost of a unit of excess: more than the multipliers of the limits that a solution touches."""
+"""Cost per unit of constraint violation: above the multipliers of the active constraints."""
 SHARPNESS = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e7, 1e7)
-"""Weights of the cost against the barrier, one after the other."""
+"""Successive weights of the cost relative to the barrier."""
 SIGN = np.array([1.0, -1.0, -1.0, -1.0])[:, None]
 
 
 class Affine(NamedTuple):
-    """Vectors that are affine in k unknowns: ``slope`` (k, d, n) and ``offset`` (d, n)."""
+    """n vectors of dimension d that are affine in k unknowns."""
 
     slope: Array
+    """Derivatives by the unknowns, (k, d, n)."""
     offset: Array
+    """Vectors at unknowns of zero, (d, n)."""
 
     def at(self, x: Array) -> Array:
         """Return the vectors (d, n) at ``x`` (k,)."""
@@ -33,28 +35,29 @@ class Affine(NamedTuple):
         return Affine(*(np.einsum("ed,...dn->...en", matrix, part) for part in self))
 
     def mixed(self, shares: Array) -> "Affine":
-        """Return sums of the vectors, with ``shares`` (m, n) of each: m vectors."""
+        """Return m linear combinations of the vectors, with the weights ``shares`` (m, n)."""
         return Affine(*(np.einsum("mn,...n->...m", shares, part) for part in self))
 
     def plus(self, row: int, length: float) -> "Affine":
-        """Return the vectors with ``length`` added to one component."""
+        """Return the vectors with ``length`` added to component ``row``."""
         offset = self.offset.copy()
         offset[row] += length
         return Affine(self.slope, offset)
 
     def beside(self, other: "Affine") -> "Affine":
-        """Return these vectors and the other ones."""
+        """Return these vectors followed by the other ones."""
         return Affine(*(np.concatenate(parts, axis=-1) for parts in zip(self, other, strict=True)))
 
 
 def least(lengths: Affine, weight: Array, shortest: float, cones: Affine) -> tuple[Array, float]:
-    """Return the unknowns (k,), and by how much the limits are exceeded.
+    """Return the unknowns (k,) and the constraint violation.
 
-    Minimizes sum(weight |v|) over the n vectors of ``lengths`` with |v| >= ``shortest``, where each
-    vector (t, x, y, z) of ``cones`` has t >= |(x, y, z)|. Limits that contradict each other are all
-    exceeded by the same, least excess, which costs ``PENALTY`` a unit. A least length is no convex
-    limit: the component of v along the v of the step before, at first along its third axis, is
-    limited in its place, so that the solution is a local one. Numbers should be of order one.
+    Minimizes sum(weight |v|) over the n vectors v of ``lengths`` subject to |v| >= ``shortest`` and
+    to t >= |(x, y, z)| for each vector (t, x, y, z) of ``cones``. Where the constraints contradict
+    each other, all are violated by the same least amount, at a cost of ``PENALTY`` a unit. A least
+    length is not a convex constraint: it is replaced by one on the component of v along the v of
+    the previous iteration (along the third axis in the first), so that the solution is a local
+    minimum. Numbers should be of order one.
 
     Boyd and Vandenberghe, Convex Optimization, 2004, sections 11.3 and 11.6.
     """
@@ -68,7 +71,7 @@ def least(lengths: Affine, weight: Array, shortest: float, cones: Affine) -> tup
     cones = cones.beside(Affine(excess, np.zeros((4, 1))))
 
     x, toward = np.zeros(k + 1), np.tile([[0.0], [0.0], [1.0]], n)
-    # Inside every cone, and with the third component of every vector beyond the shortest length.
+    # Start inside every cone, with the third component of every vector above the shortest length.
     x[k] = (
         1.0 + abs(shortest) + np.abs(cones.offset).sum(axis=0).max() + np.abs(lengths.offset).max()
     )
@@ -83,7 +86,7 @@ def least(lengths: Affine, weight: Array, shortest: float, cones: Affine) -> tup
 
 
 def _center(x: Array, lengths: Affine, weight: Array, penalty: float, cones: Affine) -> Array:
-    """Return the minimum of cost and barrier, by Newton's method from ``x`` inside the cones."""
+    """Return the minimizer of cost plus barrier, by Newton's method from ``x`` inside the cones."""
 
     def value(x: Array) -> float:
         v = cones.at(x)
@@ -97,20 +100,20 @@ def _center(x: Array, lengths: Affine, weight: Array, penalty: float, cones: Aff
     for _ in range(60):
         slope, curvature = _derivatives(x, lengths, weight, cones)
         slope[-1] += penalty
-        step = -_solved(curvature, slope)
+        step = -_solve(curvature, slope)
         gain, share = -(slope * step).sum(), 1.0
         if gain < 1e-6:
             break
         while (after := value(x + share * step)) > now - 0.1 * share * gain:
             share *= 0.5
             if share < 1e-9:
-                return x  # what is left to gain is rounding
+                return x  # the remaining gain is rounding
         x, now = x + share * step, after
     return x
 
 
 def _derivatives(x: Array, lengths: Affine, weight: Array, cones: Affine) -> tuple[Array, Array]:
-    """Return gradient (k,) and Hessian (k, k) of cost and barrier, without the excess' cost."""
+    """Return gradient (k,) and Hessian (k, k) of cost plus barrier, without the penalty term."""
     v = lengths.at(x)
     size = _size(v)
     along = (lengths.slope * (v / size)).sum(axis=1)
@@ -126,7 +129,7 @@ def _derivatives(x: Array, lengths: Affine, weight: Array, cones: Affine) -> tup
 
 
 def _gram(vectors: Array, weight: Array) -> Array:
-    """Return the weighted products of each unknown's vectors with each other's, (k, k)."""
+    """Return the weighted Gram matrix (k, k) of the unknowns' vectors (k, d, n)."""
     k = len(vectors)
     heavy = (vectors * weight).reshape(k, -1)
     products: Array = np.einsum("ka,la->kl", heavy, vectors.reshape(k, -1))
@@ -134,13 +137,13 @@ def _gram(vectors: Array, weight: Array) -> Array:
 
 
 def _size(vectors: Array) -> Array:
-    """Return the lengths, never quite zero so that they have a direction and a derivative."""
+    """Return the lengths (n,), bounded away from zero so that they are differentiable."""
     size: Array = np.sqrt((vectors**2).sum(axis=0) + 1e-12)
     return size
 
 
-def _solved(matrix: Array, right: Array) -> Array:
-    """Return matrix^-1 right, of a positive definite matrix (k, k), by elimination."""
+def _solve(matrix: Array, right: Array) -> Array:
+    """Return matrix^-1 right for a positive definite matrix (k, k), by Gaussian elimination."""
     rows, k = np.column_stack([matrix, right]), len(right)
     for i in range(k):
         rows[i + 1 :] -= rows[i + 1 :, i : i + 1] / rows[i, i] * rows[i]

@@ -1,7 +1,8 @@
-"""Wanted descents to a landing site on the Moon, and the attitude that thrust along them needs.
+"""Desired descents to a landing site on the Moon, with the attitude that their thrust requires.
 
-World axes: x and y in the landing plane, z up, the origin on the site; (x, y, z) are (Y, Z, X) of
-paper 003 (CNCA 2019), less the Moon's radius on X, and so are the body axes: z along the thrust.
+World axes: x and y in the landing plane, z up, the origin at the site. (x, y, z) are (Y, Z, X) of
+paper 003 (CNCA 2019), less the Moon's radius on X. Body axes are permuted alike: z is along the
+thrust.
 """
 
 from abc import ABC, abstractmethod
@@ -10,45 +11,44 @@ from dataclasses import dataclass
 import numpy as np
 
 from mjspace import attitude as att
-from mjspace.contract import Array, Gains, Trajectory, gain
+from mjspace.contract import Array, Trajectory, gain
+
+from .lander_gains import LunarGravity
 
 
 @dataclass(frozen=True)
-class Descent(Gains, ABC):
-    """From ``height`` and ``reach`` to the site along one shape, then a hover, then down.
+class Descent(LunarGravity, ABC):
+    """A straight path from ``height`` and ``reach`` to the site, then a hover, then a descent.
 
-    The wanted attitude is the paper's: z along the thrust that the wanted motion needs against
-    gravity, tilted by gamma_d in the vertical plane of ``azimuth``, and the body's y normal to it.
-    Its rate is that of the attitude; the paper takes it as zero.
+    The desired attitude is the paper's: z along the thrust that the motion requires against
+    gravity, tilted by gamma_d in the vertical plane of ``azimuth``, and the body's y normal to that
+    plane. The desired rate is that of the attitude; the paper sets it to zero.
     """
 
     duration: float = gain("s", above=0.0)
-    """T, of the shape."""
+    """T: duration of the path."""
     height: float = gain("m", default=1000.0, at_least=0.0)
-    """At the start, above where the shape ends."""
+    """Height of the start above the end of the path."""
     reach: float = gain("m", default=2500.0, at_least=0.0)
-    """At the start, along the landing plane."""
+    """Horizontal distance of the start from the site."""
     azimuth: float = gain("rad", default=0.6435, at_least=-2.0 * np.pi, at_most=2.0 * np.pi)
-    """theta_d: of the vertical plane, from x towards y."""
+    """theta_d: direction of the vertical plane, from x towards y."""
     clearance: float = gain("m", default=0.0, at_least=0.0)
-    """How high the shape ends; the start is as much higher. In the paper: on the ground."""
+    """Height of the end of the path above the site; it raises the start, too. The paper has 0."""
     hover: float = gain("s", default=0.0, at_least=0.0)
-    """How long it stays there."""
+    """Duration of the hover at the end of the path."""
     descent_speed: float = gain("m/s", default=0.5, at_least=0.0)
-    """Afterwards, without end: what touches down has to notice it."""
+    """Speed of the descent after the hover. It has no end: the law has to detect touchdown."""
     stance: float = gain("m", default=1.8, at_least=0.0)
-    """Of the vehicle's origin above the ground when it stands."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
-    """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6, above=0.0)
-    """Of the landing plane, tangent there."""
+    """Height of the body origin above the ground when the vehicle stands."""
 
     @abstractmethod
     def shape(self, s: Array) -> list[Array]:
-        """Return what is left of the way, 1 to 0, and its first four derivatives by ``s`` (n,)."""
+        """Return the remaining fraction of the path, from 1 to 0, and its first four derivatives
+        by ``s`` (n,), the fraction of ``duration`` elapsed."""
 
     def at(self, time: Array) -> Trajectory:
-        """Return the descent at each ``time`` [s]."""
+        """Return the motion at each ``time`` (n,) [s]."""
         start = np.array([np.cos(self.azimuth), np.sin(self.azimuth), 0.0]) * self.reach
         start[2] = self.height
         late = time - self.duration
@@ -65,9 +65,9 @@ class Descent(Gains, ABC):
 
 @dataclass(frozen=True)
 class SineDescent(Descent):
-    """1 - sin(pi t / 2T), table 2 of paper 003; it ends with an acceleration of 0.166 m/s^2.
+    """1 - sin(pi t / 2T), table 2 of paper 003, which ends with an acceleration of 0.166 m/s^2.
 
-    T is printed nowhere (erratum 18): 200 s fits the figures' time axis.
+    T is not printed (erratum 18); 200 s fits the time axis of the figures.
     """
 
     duration: float = gain("s", default=200.0, above=0.0)
@@ -81,7 +81,7 @@ class SineDescent(Descent):
 
 @dataclass(frozen=True)
 class CubicDescent(Descent):
-    """(1 - t/T)^3, ours: it starts at the printed velocities and ends without acceleration."""
+    """(1 - t/T)^3, not from the paper: starts at the printed velocities, ends unaccelerated."""
 
     duration: float = gain("s", default=300.0, above=0.0)
 
@@ -94,11 +94,12 @@ class CubicDescent(Descent):
 def powered(
     motion: list[Array], azimuth: float, gravity_parameter: float, moon_radius: float
 ) -> Trajectory:
-    """Return a motion with the attitude, rate and acceleration that its thrust needs.
+    """Return a motion with the attitude, rate and angular acceleration that its thrust requires.
 
     ``motion`` is the position and its first four derivatives, world axes, each (n, 3) [m/s^k]. The
-    attitude turns by ``azimuth`` [rad] about z, then the shortest way from z to the thrust: with
-    thrust in that vertical plane it is psi = theta_d, phi = 0, gamma = gamma_d of paper 003.
+    attitude is a rotation by ``azimuth`` [rad] about z, then the shortest one from z to the thrust.
+    With the thrust in that vertical plane it is psi = theta_d, phi = 0, gamma = gamma_d of paper
+    003.
     """
     position, velocity, acceleration = motion[:3]
     thrust = _specific_force(motion, gravity_parameter, moon_radius)
@@ -109,7 +110,7 @@ def powered(
     size = np.linalg.norm(f, axis=-1)
     dsize = _dot(f, df) / size
     ddsize = (_dot(df, df) + _dot(f, ddf) - dsize**2) / size
-    # Not of unit length: its rate is 2 (Q* Q')_v / |Q|^2 all the same.
+    # Q is not of unit length; the rate is 2 (Q* Q')_v / |Q|^2.
     Q, dQ, ddQ = (
         np.stack([along + part[:, 2], -part[:, 1], part[:, 0], 0.0 * along], axis=-1)
         for along, part in ((size, f), (dsize, df), (ddsize, ddf))
@@ -124,9 +125,9 @@ def powered(
 
 
 def _specific_force(motion: list[Array], mu: float, radius: float) -> list[Array]:
-    """Return thrust over mass [m/s^2] along a motion, and its first two derivatives, (n, 3) each.
+    """Return thrust over mass [m/s^2] along a motion and its first two derivatives, (n, 3) each.
 
-    The second leaves out the change of gravity's gradient, 1e-8 m/s^4 at 30 m/s.
+    The second derivative neglects the change of the gravity gradient, 1e-8 m/s^4 at 30 m/s.
     """
     position, velocity, acceleration, jerk, snap = motion
     p = position + np.array([0.0, 0.0, radius])

@@ -1,6 +1,6 @@
-"""The limits of a descent to the Moon, and the Bezier curve of one duration that burns least.
+"""Limits of a descent to the Moon, and the Bezier curve of given duration that burns least.
 
-Places are (along, across, up) from the site, the ground is flat.
+Positions are (along, across, up) from the site [m]; the ground is flat.
 """
 
 from dataclasses import dataclass
@@ -14,58 +14,59 @@ from .bezier import bernstein, curve
 from .cone_program import Affine
 
 SCALE = 100.0
-"""Metres that a plan's search counts in."""
+"""Unit of length of the optimization [m]: its numbers should be of order one."""
 ROOM = 1.5e-3
-"""What the search keeps from its limits, in weights and in ``SCALE``: between its instants, too."""
+"""Margin of the optimization to its limits, in units of the vehicle's weight and of ``SCALE``: with
+it the limits also hold between the instants of the grid."""
 GRID = 201
-"""Instants of a descent at which its search minds the limits."""
+"""Number of instants at which the optimization checks the limits."""
 FREE = np.zeros((10, 3, 10))
-"""What each of the ten unknowns moves of (along, across, up) of the ten points."""
+"""Derivative of (along, across, up) of the ten points by each of the ten unknowns."""
 FREE[[0, 1, 2, 3], [0, 1, 0, 1], [4, 4, 5, 5]] = SCALE
 FREE[range(4, 10), 2, range(2, 8)] = SCALE
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a descent keeps to."""
+    """Limits of a descent."""
 
     mass: float
-    """Of the vehicle [kg], taken as constant."""
+    """Mass of the vehicle [kg], taken as constant."""
     gravity: float
-    """At the site [m/s^2]."""
+    """Gravity at the site [m/s^2]."""
     thrust: tuple[float, float]
-    """Least and most [N]."""
+    """Least and largest thrust [N]."""
     tilt: float
-    """Of the thrust from the vertical [rad], at most."""
+    """Largest angle of the thrust from the vertical [rad]."""
     glide_slope: float
-    """Height over distance from the end, at least, less a metre of height."""
+    """Least height over horizontal distance from the end; a metre of height is tolerated."""
     clearance: float
-    """Height of the end [m]."""
+    """Height of the end above the site [m]."""
     descent_speed: float
-    """At the end [m/s]."""
+    """Downward speed at the end [m/s]."""
 
     @property
     def end(self) -> Array:
-        """Where a descent ends [m], shape (3,)."""
+        """Position of the end [m], shape (3,)."""
         return np.array([0.0, 0.0, self.clearance])
 
     @property
     def effort(self) -> Array:
-        """Least and most thrust over the vehicle's weight, shape (2,)."""
+        """Least and largest thrust over the vehicle's weight, shape (2,)."""
         return np.array(self.thrust) / (self.mass * self.gravity)
 
 
 def shortest_duration(height: float, speed: float, limits: Limits) -> float:
-    """Return a lower bound of a descent's duration [s]; inf where it cannot be braked in time.
+    """Return a lower bound of a descent's duration [s]; inf where it cannot brake in time.
 
-    It drops from ``height`` [m] at ``speed`` [m/s, down] as fast as the limits allow, then brakes
-    with full thrust to the descent speed.
+    The vehicle falls from ``height`` [m] at ``speed`` [m/s, down] as fast as the limits allow, then
+    brakes with full thrust to the descent speed.
     """
     least, most = limits.effort
     drop = limits.gravity * (1.0 - least * np.cos(limits.tilt))
     brake = limits.gravity * (most - 1.0)
     last = limits.descent_speed
-    # One metre lower than the end is within the glide slope.
+    # The glide slope admits a position one metre below the end.
     if brake <= 0.0 or speed**2 - last**2 > 2.0 * brake * (height + 1.0):
         return float("inf")
     square = (2.0 * height * drop * brake + brake * speed**2 + drop * last**2) / (drop + brake)
@@ -74,10 +75,11 @@ def shortest_duration(height: float, speed: float, limits: Limits) -> float:
 
 
 def keeps(points: Array, duration: float, place: Array, velocity: Array, limits: Limits) -> bool:
-    """Return whether a descent keeps to ``limits`` at every 2000th of ``duration`` [s].
+    """Tell whether a descent is within ``limits`` at every 2000th of its ``duration`` [s].
 
-    It has to start at ``place`` with ``velocity`` and end as the limits say, both without
-    horizontal acceleration and jerk, within 1e-3 m, m/s, m/s^2 and m/s^3.
+    ``points`` (n, 3) [m] are its control points. It has to start at ``place`` [m] with ``velocity``
+    [m/s] and end as the limits say, at both ends without horizontal acceleration and jerk, to
+    within 1e-3 m, m/s, m/s^2 and m/s^3.
     """
     if not 0.0 < duration < np.inf:
         return False
@@ -95,14 +97,15 @@ def keeps(points: Array, duration: float, place: Array, velocity: Array, limits:
     return bool(within and np.abs(np.concatenate(missed)).max() < 1e-3)
 
 
-def thriftiest(
+def least_propellant(
     duration: float, place: Array, velocity: Array, limits: Limits
 ) -> tuple[Array, float]:
-    """Return the points (10, 3) that burn least in ``duration`` [s], and their cost.
+    """Return the control points (10, 3) [m] that burn least in ``duration`` [s], and their cost.
 
-    The cost is thrust over weight, summed over time [s]; more where no points keep to the limits.
+    The cost is the integral of thrust over weight [s], plus a penalty where no points are within
+    the limits.
     """
-    # Evenly spaced points: no horizontal acceleration and jerk, hence no tilt and no rate.
+    # Evenly spaced end points: no horizontal acceleration and jerk, hence no tilt and no rate.
     ends = np.arange(4)[:, None] * (duration / 9.0)
     fixed = np.zeros((10, 3))
     fixed[:4], fixed[:5:-1] = place + ends * velocity, limits.end
@@ -110,7 +113,7 @@ def thriftiest(
     fixed[2:8, 2] = 0.0
     points = Affine(FREE, fixed.T)
 
-    s = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, GRID))  # dense where thrust changes fast
+    s = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, GRID))  # dense at the ends
     bend = bernstein(7, s) * (72.0 / (duration**2 * limits.gravity))
     effort = Affine(*(np.diff(part, 2) for part in points)).mixed(bend).plus(2, 1.0)
     above = points.plus(2, -limits.clearance).mixed(bernstein(9, s) / SCALE).plus(2, 1.0 / SCALE)
@@ -126,5 +129,5 @@ def thriftiest(
 
 
 def _cone(up: float, aside: float) -> Array:
-    """Return what makes a vector one of a cone about the vertical: (up z, aside x, aside y, 0)."""
+    """Return the matrix (4, 3) to (up z, aside x, aside y, 0): a cone about the vertical."""
     return np.array([[0.0, 0.0, up], [aside, 0.0, 0.0], [0.0, aside, 0.0], [0.0, 0.0, 0.0]])

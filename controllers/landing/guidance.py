@@ -1,7 +1,7 @@
-"""A descent to the Moon along a Bezier curve, and the plan of the one that burns least.
+"""A descent to the Moon along a Bezier curve, and the planning of the one that burns least.
 
-World axes as in ``descent``; the curve is given in (along, across, up), with ``along`` horizontal
-at ``azimuth``.
+World axes as in ``descent``. The curve is in (along, across, up), with ``along`` horizontal at
+``azimuth``.
 """
 
 from collections.abc import Callable
@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjspace.contract import Array, Gains, Trajectory, gain
+from mjspace.contract import Array, Trajectory, gain
 
 from .bezier import curve
 from .descent import powered
-from .descent_limits import Limits, keeps, shortest_duration, thriftiest
+from .descent_limits import Limits, keeps, least_propellant, shortest_duration
+from .lander_gains import LunarGravity
 
 EXHAUST_SPEED = 320.0 * 9.80665
 """Isp g0 of the lander's engine [m/s]."""
@@ -29,39 +30,35 @@ TABLE_3 = (
     (0.0, 0.0, 6.408),
     (0.0, 0.0, 2.0),
 )
-"""What ``plan`` finds for the start of paper 003's table 3 [m], to be flown in 79.346 s."""
+"""Control points [m] that ``plan`` finds from the start of paper 003's table 3, for 79.346 s."""
 PACE = 1.15
-"""Ratio of the durations that the search of a plan starts with."""
+"""Ratio of successive durations in the coarse search of ``plan``."""
 
 
 @dataclass(frozen=True)
-class BezierDescent(Gains):
-    """A Bezier curve to above the site, then down at its last speed, without end.
+class BezierDescent(LunarGravity):
+    """A Bezier curve to a point above the site, then a descent at its final speed, without end.
 
-    By default it starts as in paper 003's table 3 and burns 5.13 kg within 70 and 270 N and 45 deg
-    of tilt, where the paper's own descent needs 10.7 kg.
+    The default starts as in paper 003's table 3 and burns 5.13 kg within 70 to 270 N and 45 deg of
+    tilt; the paper's own descent needs 10.7 kg.
     """
 
     duration: float = gain("s", default=79.346, above=0.0)
-    """T, of the curve."""
+    """T: duration of the curve."""
     points: Array = gain("m", (None, 3), default=TABLE_3)
-    """Control points, (along, across, up) from the site, n + 1 rows for degree n."""
+    """Control points, (along, across, up) from the site; n + 1 rows for degree n."""
     azimuth: float = gain("rad", default=0.6435, at_least=-2.0 * np.pi, at_most=2.0 * np.pi)
-    """Of ``along``, from x towards y."""
+    """Direction of ``along``, from x towards y."""
     stance: float = gain("m", default=1.8, at_least=0.0)
-    """Of the vehicle's origin above the ground when it stands."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
-    """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6, above=0.0)
-    """Of the landing plane, tangent there."""
+    """Height of the body origin above the ground when the vehicle stands."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.points) < 5:
-            raise ValueError(f"points has {len(self.points)} rows: 5 or more would do")
+            raise ValueError(f"points: got {len(self.points)} rows, should be 5 or more")
 
     def at(self, time: Array) -> Trajectory:
-        """Return the descent at each ``time`` [s]."""
+        """Return the motion at each ``time`` (n,) [s]."""
         late = np.maximum(time - self.duration, 0.0)
         motion = curve(self.points, self.duration, np.minimum(time / self.duration, 1.0))
         motion[0] += late[:, None] * motion[1]
@@ -86,20 +83,21 @@ def plan(
     clearance: float = 2.0,
     descent_speed: float = 0.5,
 ) -> tuple[float, Array]:
-    """Return the duration [s] and the points (10, 3) [m] that burn least.
+    """Return the duration [s] and the control points (10, 3) [m] that burn least.
 
-    ``place`` and ``velocity``, (along, across, up), are where the descent starts, upright and not
-    turning, and so it ends, ``clearance`` [m] up and descending. In between the thrust stays in
-    ``thrust_range`` [N] and within ``tilt_limit`` [rad] of the vertical, and the vehicle above
-    ``glide_slope`` times its distance, less a metre. Flat ground, ``mass`` [kg] constant.
+    The descent starts at ``place`` [m] with ``velocity`` [m/s], both (3,) in (along, across, up),
+    and ends at ``clearance`` [m] above the site with ``descent_speed`` [m/s]; at both ends the
+    vehicle is upright and does not rotate. In between the thrust stays within ``thrust_range`` [N]
+    and within ``tilt_limit`` [rad] of the vertical, and the height above ``glide_slope`` times the
+    horizontal distance, less a metre. Flat ground, constant ``mass`` [kg].
 
-    What a hovering engine burns goes with time, so the thriftiest descent is a short one: it drops
-    first, and brakes late, at nearly full thrust. The duration lies between the shortest in which
-    thrust and gravity can take away height and speed, and that of a mean speed of
-    ``descent_speed``; no longer one is tried than the gravity losses of the best one allow.
+    Hovering burns propellant in proportion to time, so the best descent is short: it falls first
+    and brakes late, at nearly full thrust. Durations are tried from the lower bound
+    ``shortest_duration`` to that of a mean speed of ``descent_speed``, but no longer than the
+    gravity losses of the best one so far allow.
 
     Raises:
-        ValueError: no descent was found that ``keeps`` within the limits.
+        ValueError: no descent within the limits was found.
     """
     limits = Limits(mass, gravity, thrust_range, tilt_limit, glide_slope, clearance, descent_speed)
     refused = f"no descent from {place} m at {velocity} m/s"
@@ -112,7 +110,7 @@ def plan(
         raise ValueError(f"{refused}: full thrust does not brake it above the ground")
 
     def cost(duration: float) -> float:
-        return thriftiest(duration, place, velocity, limits)[1]
+        return least_propellant(duration, place, velocity, limits)[1]
 
     costs: dict[float, float] = {}
     duration = max(shortest, 1.0)
@@ -126,19 +124,19 @@ def plan(
         raise ValueError(f"{refused} lasts between {shortest:.4g} and {longest:.4g} s")
     best = min(costs, key=lambda duration: costs[duration])
     duration = _golden(cost, max(best / PACE, shortest), min(best * PACE, longest))
-    points = thriftiest(duration, place, velocity, limits)[0]
+    points = least_propellant(duration, place, velocity, limits)[0]
     if not keeps(points, duration, place, velocity, limits):
         raise ValueError(f"{refused} of {shortest:.4g} to {longest:.4g} s keeps within the limits")
     return duration, points
 
 
 def burnt(thrust: Array, time: Array) -> float:
-    """Return the propellant [kg] that ``thrust`` [N] at each ``time`` [s] burns, both (n,)."""
+    """Return the propellant burnt [kg] by ``thrust`` [N] at each ``time`` [s], both (n,)."""
     return float(np.trapezoid(thrust, time)) / EXHAUST_SPEED
 
 
 def _golden(cost: Callable[[float], float], low: float, high: float) -> float:
-    """Return where ``cost`` is least between two durations, to a twentieth of a second."""
+    """Return the duration [s] of least ``cost``, to 0.05 s, by golden-section search."""
     ratio = (np.sqrt(5.0) - 1.0) / 2.0
     a, b = high - ratio * (high - low), low + ratio * (high - low)
     cost_a, cost_b = cost(a), cost(b)

@@ -1,11 +1,13 @@
 """Descent to the Moon on one engine with two gimbals: variable-structure control of paper 003.
 
-"Control de estructura variable para un alunizador subactuado", CNCA 2019, as printed and with its
-corrections as data. The printed law tumbles in half a minute. Its frames: (x, y, z) of our world is
-(Y, Z, X) of the paper's, less the Moon's radius on X, and (x, y, z) of our body is (Yb, Zb, Xb), so
-that thrust is along our z; the vector part of a quaternion moves likewise. b2 is the outer gimbal,
-about our y, and b1 the inner one, about our -x: the thrust is
-F (cos b1 sin b2, sin b1, cos b1 cos b2) in our body axes. All arrays may have leading vehicle axes.
+"Control de estructura variable para un alunizador subactuado", CNCA 2019. The corrections of the
+printed law are gains; without them the vehicle tumbles within half a minute.
+
+Frames: our world axes (x, y, z) are the paper's (Y, Z, X), less the Moon's radius on X. Our body
+axes (x, y, z) are (Yb, Zb, Xb), so that the thrust is along our z; the vector part of a quaternion
+is permuted alike. b2 is the outer gimbal, about our y, and b1 the inner one, about our -x: the
+thrust is F (cos b1 sin b2, sin b1, cos b1 cos b2) in body axes. All arrays may have leading vehicle
+axes.
 """
 
 from dataclasses import dataclass
@@ -14,78 +16,70 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Gains, Measurement, ThrustCommand, Trajectory, gain
+from mjspace.contract import Array, Measurement, ThrustCommand, Trajectory, gain
 
 from . import lander_kernels as kernels
+from .lander_gains import GimballedEngine
 from .lander_lqr import PRINTED, lqr_gain
 
 
 class State(NamedTuple):
-    """Memory: whether the ground was touched."""
+    """Memory of the law: whether the engine was cut at touchdown."""
 
     cut: Array
-    """1.0 once the engine is cut, for good, (..., 1)."""
+    """1.0 from touchdown on, when the engine is cut for good, else 0.0; (..., 1)."""
 
 
 class Signals(NamedTuple):
-    """What the law shows."""
+    """Signals of the law."""
 
     position_error: Array
-    """Position less the wanted one [m], world axes, (..., 3)."""
+    """Measured less desired position [m], world axes, (..., 3)."""
     Z: Array
     """z3 to z9 of the errors, (..., 7)."""
     S: Array
     """The sliding variables, (..., 3)."""
     wanted_thrust: Array
-    """Before the limits [N], (..., 1)."""
+    """Commanded thrust before its limits [N], (..., 1)."""
     wanted_gimbal: Array
-    """Before the limits, outer and inner [rad], (..., 2)."""
+    """Commanded gimbal angles before their limits, outer and inner [rad], (..., 2)."""
 
 
 @dataclass(frozen=True)
-class VariableStructure(Gains):
+class VariableStructure(GimballedEngine):
     """U = -S - rho tanh(rho S / delta) with S = Ka X2 + Rx(alpha) K Z, (33), (34), (36).
 
-    With all corrections as by default, and thrust that knows gravity and the wanted acceleration,
-    it lands (O2); with ``loop_share`` (1, 0.35, 1) also behind slow gimbals (O3). The paper's
-    figure 6 needs ``follows_gravity`` false (O1). The printed law has, besides, "polar"
-    ``coordinates``, no ``mixes_before_turning``, ``equilibrium_thrust`` 0 and a positive k3.
+    The defaults have all corrections and feed gravity and the desired acceleration forward: the
+    vehicle lands (O2), with ``loop_share`` (1, 0.35, 1) also behind slow gimbals (O3). The paper's
+    figure 6 needs ``follows_gravity`` false (O1). The printed law also has "polar"
+    ``coordinates``, ``mixes_before_turning`` false, ``equilibrium_thrust`` 0 and a positive k3.
     """
 
     batched: ClassVar[bool] = True
 
     coordinates: str = "frozen"
-    """"polar" (printed, made for r = re), "scaled" by r/re (M3), or "frozen" axes (M3, M6)."""
+    """"polar" (as printed, valid at r = re), "scaled" by r/re (M3), or "frozen" axes (M3, M6)."""
     mixes_before_turning: bool = True
-    """M5: Ka Rx Ka^-1 K for Rx K; without it, a roll rate leads astray (erratum 14)."""
+    """M5: Ka Rx Ka^-1 K instead of Rx K; without it a roll rate causes errors (erratum 14)."""
     follows_gravity: bool = True
-    """Thrust m (x_d'' + g + U1) / cos(tilt); else Fe + U1, where U1 is in newtons."""
+    """True: thrust m (x_d'' + g + U1) / cos(tilt). False: Fe + U1, with U1 in newtons."""
     equilibrium_thrust: float = gain("N", default=160.0, at_least=0.0)
-    """Fe (M1); printed: 0, so that U1 has to hold the weight (erratum 9)."""
+    """Fe (M1); 0 as printed, so that U1 has to carry the weight (erratum 9)."""
     recomputed: bool = False
-    """K by the Riccati equation, in place of the printed one."""
+    """True: K is solved from the Riccati equation. False: K as printed."""
     surface_gain: Array = gain(shape=(3,), default=(1.0, 14.0, -2.0))
-    """Ka; k3 is printed as +2, for which K's third row has the wrong sign (M2, erratum 10)."""
+    """Ka; printed with k3 = +2, which contradicts the sign of K's third row (M2, erratum 10)."""
     loop_share: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0), above=0.0)
-    """Multiplies S: how fast each axis is brought to its surface."""
+    """Factor on S: scales the speed at which each axis reaches its sliding surface."""
     robust_gain: float = gain(default=1.0, at_least=0.0)
-    """rho; with the printed delta it adds 2 % to S, and no robustness (erratum 17)."""
+    """rho; with the printed delta it adds 2 % to S, but no robustness (erratum 17)."""
     smoothing: float = gain(default=50.0, above=0.0)
     """delta."""
     radius: float = gain("m", default=1e4, above=0.0)
-    """re, that K is made for."""
-    mass: float = gain("kg", default=100.0, above=0.0)
-    """m, at the start."""
+    """re: the distance from the site for which K is designed."""
     tank: float = gain("kg", default=0.0, at_least=0.0)
-    """Propellant at the start: what its gauge shows to be gone makes m less. 0: m stays."""
-    thrust_range: Array = gain("N", (2,), default=(50.0, 320.0), at_least=0.0, at_most=np.inf)
-    """Least, without which no torque is left, and largest."""
-    gimbal_limit: float = gain("rad", default=np.radians(20.0), above=0.0, at_most=np.pi)
-    """Of either angle."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
-    """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6, above=0.0)
-    """Of the landing site."""
+    """Propellant at the start: m decreases with what the gauge measures as burnt. 0: m is constant.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -93,33 +87,29 @@ class VariableStructure(Gains):
             have = ", ".join(_COORDINATES)
             raise ValueError(f"coordinates: got {self.coordinates!r}, should be one of {have}")
         if not np.all(self.surface_gain):
-            raise ValueError(f"surface_gain: got {self.surface_gain}, none of it may be zero")
-        if not (np.inf > self.thrust_range[0] <= self.thrust_range[1]):
-            raise ValueError(
-                f"thrust_range: got {self.thrust_range} N, should be the least, then the largest"
-            )
+            raise ValueError(f"surface_gain: got {self.surface_gain}, should have no zero")
 
     def reset(self, measurement: Measurement, reference: Trajectory) -> State:
-        """Return the state of an engine that burns."""
+        """Return the initial state: the engine is not cut."""
         return State(np.zeros_like(measurement.position[..., :1]))
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Trajectory
     ) -> tuple[State, ThrustCommand, Signals]:
-        """Return the state, the thrust with the gimbals' angles, and the errors."""
+        """Return the next state, the thrust and gimbal angles, and the errors."""
         cut = touched(state.cut, measurement)
-        seen, wanted = measurement, reference
-        Z, S, asked, given = kernels.variable_structure(
-            seen.attitude, seen.rate, seen.position, seen.velocity,
-            wanted.attitude, wanted.position, wanted.velocity, wanted.linear_acceleration,
-            *self._gains[:-2], self._engine(seen.propellant), self._gains[-1],
+        at, desired = measurement, reference
+        Z, S, commanded, limited = kernels.variable_structure(
+            at.attitude, at.rate, at.position, at.velocity,
+            desired.attitude, desired.position, desired.velocity, desired.linear_acceleration,
+            *self._gains[:-2], self._engine(at.propellant), self._gains[-1],
         )  # fmt: skip
-        error = seen.position - wanted.position
-        shown = Signals(error, Z, S, asked[..., :1], asked[..., :0:-1])
-        return State(cut), burning(cut, given), shown
+        error = at.position - desired.position
+        signals = Signals(error, Z, S, commanded[..., :1], commanded[..., :0:-1])
+        return State(cut), burning(cut, limited), signals
 
     def _engine(self, propellant: Array) -> Array:
-        """Return the engine's numbers with the mass of now, (..., 8)."""
+        """Return the engine's parameters with the present mass, (..., 8)."""
         engine: Array = self._gains[-2]
         if not self.tank or not propellant.shape[-1]:
             return engine
@@ -138,20 +128,20 @@ class VariableStructure(Gains):
         return feedback, numbers[0], self.surface_gain, self.loop_share, *numbers[1:]
 
 
-_MASS = 1  # its place among the engine's numbers
+_MASS = 1  # index among the engine's parameters
 _COORDINATES = {"polar": kernels.POLAR, "scaled": kernels.SCALED, "frozen": kernels.FROZEN}
 
 
 def touched(cut: Array, measurement: Measurement) -> Array:
-    """Return 1.0 where the engine was cut or the feet touch the ground, (..., 1).
+    """Return 1.0 where the engine was cut before or the contact sensor reports touchdown, (..., 1).
 
-    A vehicle without such a sensor is never told.
+    On a vehicle without a contact sensor ``cut`` stays as it is.
     """
     contact = measurement.contact
     return np.maximum(cut, contact) if contact.shape[-1] else cut.copy()
 
 
-def burning(cut: Array, asked: Array) -> ThrustCommand:
-    """Return the command of ``asked``, [F, b1, b2] (..., 3) in N and rad, or none once cut."""
-    given = np.where(cut > 0.0, 0.0, asked)
-    return ThrustCommand(given[..., :1], given[..., :0:-1].copy())
+def burning(cut: Array, thrust: Array) -> ThrustCommand:
+    """Return the command for ``thrust`` [F, b1, b2] (..., 3) in N and rad, zeros where ``cut``."""
+    commanded = np.where(cut > 0.0, 0.0, thrust)
+    return ThrustCommand(commanded[..., :1], commanded[..., :0:-1].copy())

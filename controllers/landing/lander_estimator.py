@@ -1,6 +1,6 @@
-"""The lander's laws on what a filter believes, in place of what is true: paper 003's future work.
+"""The lander's laws on the estimates of a navigation filter: future work of paper 003.
 
-Position, velocity and attitude are read once, at the start: the last fix before the descent.
+Measured position, velocity and attitude are read once, as the last fix before the descent.
 """
 
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ import numpy as np
 from mjspace.contract import Array, Measurement, Trajectory
 
 from . import lander, lander_vectoring
-from .lander_filter import Belief, Navigation
+from .lander_filter import FilterState, Navigation
 
 
-class Shown(NamedTuple):
-    """What is shown besides the law's own signals."""
+class Estimates(NamedTuple):
+    """The filter's signals, logged beside those of the law."""
 
     believed_position: Array
     """World axes [m], (..., 3)."""
@@ -24,65 +24,67 @@ class Shown(NamedTuple):
     believed_attitude: Array
     """Quaternion, body to world, (..., 4)."""
     sigma: Array
-    """Standard deviations of position, velocity and attitude (body axes), SI, (..., 9)."""
+    """Estimated standard deviations of position [m] and velocity [m/s], world axes, and of the
+    attitude [rad], body axes, (..., 9)."""
 
 
 def _joined(name: str, *parts: Any) -> Any:
-    """Return a named tuple that has the fields of all ``parts``."""
+    """Return a named tuple type with the fields of all ``parts``."""
     return NamedTuple(name, [(f, part.__annotations__[f]) for part in parts for f in part._fields])
 
 
-StructureState = _joined("StructureState", lander.State, Belief)
-StructureSignals = _joined("StructureSignals", lander.Signals, Shown)
-VectoringState = _joined("VectoringState", lander_vectoring.State, Belief)
-VectoringSignals = _joined("VectoringSignals", lander_vectoring.Signals, Shown)
+StructureState = _joined("StructureState", lander.State, FilterState)
+StructureSignals = _joined("StructureSignals", lander.Signals, Estimates)
+VectoringState = _joined("VectoringState", lander_vectoring.State, FilterState)
+VectoringSignals = _joined("VectoringSignals", lander_vectoring.Signals, Estimates)
 
 
 @dataclass(frozen=True, kw_only=True)
 class EstimatedStructure(lander.VariableStructure, Navigation):
-    """``lander.VariableStructure``, estimating."""
+    """``lander.VariableStructure`` on estimates."""
 
     def reset(self, measurement: Measurement, reference: Trajectory) -> Any:
-        """Return the law's state, and the belief at the fix."""
+        """Return the law's initial state and the initial estimates."""
         return StructureState(*super().reset(measurement, reference), *self.fix(measurement))
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Trajectory
     ) -> tuple[Any, Any, Any]:
-        """Return the state, the command, and the law's signals with what is believed."""
-        belief, seen = _believing(self, state, measurement)
-        own = lander.State(*state[: -len(Belief._fields)])
-        after, command, signals = super().step(own, time, seen, reference)
-        shown = StructureSignals(*signals, *_shown(belief))
-        return StructureState(*after, *belief), command, shown
+        """Return the next state, the command, and the signals of law and filter."""
+        estimate, estimated = _navigated(self, state, measurement)
+        own = lander.State(*state[: -len(FilterState._fields)])
+        after, command, signals = super().step(own, time, estimated, reference)
+        joined = StructureSignals(*signals, *_estimates(estimate))
+        return StructureState(*after, *estimate), command, joined
 
 
 @dataclass(frozen=True, kw_only=True)
 class EstimatedVectoring(lander_vectoring.ThrustVectoring, Navigation):
-    """``lander_vectoring.ThrustVectoring``, estimating."""
+    """``lander_vectoring.ThrustVectoring`` on estimates."""
 
     def reset(self, measurement: Measurement, reference: Trajectory) -> Any:
-        """Return the law's state, and the belief at the fix."""
+        """Return the law's initial state and the initial estimates."""
         return VectoringState(*super().reset(measurement, reference), *self.fix(measurement))
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Trajectory
     ) -> tuple[Any, Any, Any]:
-        """Return the state, the command, and the law's signals with what is believed."""
-        belief, seen = _believing(self, state, measurement)
-        own = lander_vectoring.State(*state[: -len(Belief._fields)])
-        after, command, signals = super().step(own, time, seen, reference)
-        shown = VectoringSignals(*signals, *_shown(belief))
-        return VectoringState(*after, *belief), command, shown
+        """Return the next state, the command, and the signals of law and filter."""
+        estimate, estimated = _navigated(self, state, measurement)
+        own = lander_vectoring.State(*state[: -len(FilterState._fields)])
+        after, command, signals = super().step(own, time, estimated, reference)
+        joined = VectoringSignals(*signals, *_estimates(estimate))
+        return VectoringState(*after, *estimate), command, joined
 
 
-def _believing(
+def _navigated(
     navigation: Navigation, state: Any, measurement: Measurement
-) -> tuple[Belief, Measurement]:
-    belief = navigation.navigate(Belief(*state[-len(Belief._fields) :]), measurement)
-    return belief, navigation.believed(belief, measurement)
+) -> tuple[FilterState, Measurement]:
+    """Return the filter's next state, and the measurement with its estimates."""
+    estimate = navigation.navigate(FilterState(*state[-len(FilterState._fields) :]), measurement)
+    return estimate, navigation.estimated(estimate, measurement)
 
 
-def _shown(belief: Belief) -> Shown:
-    variance = np.diagonal(belief.covariance, axis1=-2, axis2=-1)[..., :9]
-    return Shown(*belief[:3], np.sqrt(variance))
+def _estimates(estimate: FilterState) -> Estimates:
+    variance = np.diagonal(estimate.covariance, axis1=-2, axis2=-1)[..., :9]
+    return Estimates(*estimate[:3], np.sqrt(variance))

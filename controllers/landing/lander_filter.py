@@ -1,9 +1,10 @@
-"""Where a lander is, from inertial sensors, an altimeter and a velocimeter: an error-state filter.
+"""Navigation of a lander by inertial sensors, altimeter and velocimeter: an error-state filter.
 
 An extended Kalman filter of the errors of (position, velocity, attitude, accelerometer bias, gyro
-bias), the attitude's a small turn in body axes: Sola, "Quaternion kinematics for the error-state
-Kalman filter", 2017, sections 5 and 6. World axes as in ``descent``. Nothing shows where the lander
-is along the ground: that error grows with the velocimeter's, from what it was at the start.
+bias); the attitude error is a small rotation in body axes. Sola, "Quaternion kinematics for the
+error-state Kalman filter", 2017, sections 5 and 6. World axes as in ``descent``. No sensor measures
+the horizontal position: its error starts as that of the initial fix and grows with the integrated
+error of the velocimeter.
 """
 
 from dataclasses import dataclass
@@ -12,13 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Gains, Measurement, gain
+from mjspace.contract import Array, Measurement, gain
 
 from . import lander_filter_kernels as kernels
+from .lander_gains import LunarGravity
 
 
-class Belief(NamedTuple):
-    """What the filter remembers."""
+class FilterState(NamedTuple):
+    """State of the filter: estimates and their covariance."""
 
     believed_position: Array
     """World axes [m], (..., 3)."""
@@ -27,86 +29,81 @@ class Belief(NamedTuple):
     believed_attitude: Array
     """Quaternion, body to world, (..., 4)."""
     believed_bias: Array
-    """Of the accelerometer [m/s^2], then of the gyro [rad/s], body axes, (..., 6)."""
+    """Biases of the accelerometer [m/s^2], then of the gyro [rad/s], body axes, (..., 6)."""
     covariance: Array
-    """Of the errors in the order above, the attitude's in body axes [rad], (..., 15, 15)."""
+    """Of the errors in the order above, attitude error in body axes [rad], (..., 15, 15)."""
     last_rate: Array
-    """The gyro's last sample [rad/s], (..., 3)."""
+    """Last sample of the gyro [rad/s], (..., 3)."""
     last_aid: Array
-    """Last altitude [m] and ground velocity [m/s], (..., 4): what is unchanged is old. Infinite
-    before the first."""
+    """Last altitude [m] and ground velocity [m/s], (..., 4): an unchanged value is no new sample.
+    Infinite before the first."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Navigation(Gains):
-    """The filter's gains: standard deviations, each of one sample and on each axis."""
+class Navigation(LunarGravity):
+    """The filter. Its gains are standard deviations of one sample, the same on each axis."""
 
     control_period: float = gain("s", above=0.0)
-    """Of ``step``, and of the gyro and the accelerometer."""
+    """Time from one step to the next; the gyro and the accelerometer have the same."""
     position_fix: float = gain("m", default=20.0, at_least=0.0)
-    """Of the position at the start, the last that is read."""
+    """Of the initial position, the only one that the filter reads."""
     velocity_fix: float = gain("m/s", default=1.0, at_least=0.0)
-    """Of the velocity at the start, likewise."""
+    """Of the initial velocity, the only one that the filter reads."""
     attitude_fix: float = gain("rad", default=0.01, at_least=0.0)
-    """Of the attitude at the start, likewise."""
+    """Of the initial attitude, the only one that the filter reads."""
     gyro_noise: float = gain("rad/s", default=1e-3, at_least=0.0)
-    """Of the white noise of ``rate``."""
+    """Of the gyro's white noise."""
     gyro_bias: float = gain("rad/s", default=1e-4, at_least=0.0)
-    """Of its bias at the start."""
+    """Of the gyro's initial bias."""
     gyro_walk: float = gain("rad/s", default=1e-6, at_least=0.0)
-    """Of its bias's walk in one second."""
+    """Of the random walk of the gyro's bias after one second."""
     accelerometer_noise: float = gain("m/s^2", default=0.01, at_least=0.0)
-    """Of the white noise of ``specific_force``, the mean of a period."""
+    """Of the accelerometer's white noise; it measures the mean over a period."""
     accelerometer_bias: float = gain("m/s^2", default=0.005, at_least=0.0)
-    """Of its bias at the start."""
+    """Of the accelerometer's initial bias."""
     accelerometer_walk: float = gain("m/s^2", default=1e-5, at_least=0.0)
-    """Of its bias's walk in one second."""
+    """Of the random walk of the accelerometer's bias after one second."""
     altimeter_noise: float = gain("m", default=0.5, above=0.0)
-    """Of ``altitude``."""
+    """Of the altitude."""
     velocimeter_noise: float = gain("m/s", default=0.05, above=0.0)
-    """Of ``ground_velocity``."""
-    gravity_parameter: float = gain("m^3/s^2", default=4.902e12, above=0.0)
-    """mu of the Moon."""
-    moon_radius: float = gain("m", default=1.738e6, above=0.0)
-    """Of the landing site."""
+    """Of the ground velocity."""
 
-    def fix(self, measurement: Measurement) -> Belief:
-        """Return the belief at the start, at the position, velocity and attitude measured then.
+    def fix(self, measurement: Measurement) -> FilterState:
+        """Return the initial estimates, with position, velocity and attitude as measured.
 
         Raises:
-            ValueError: one of the sensors is missing.
+            ValueError: the measurement lacks one of the sensors.
         """
         _require_sensors(measurement)
-        seen = measurement
-        lead = seen.rate.shape[:-1]
+        lead = measurement.rate.shape[:-1]
         spread = [self.position_fix, self.velocity_fix, self.attitude_fix]
         spread += [self.accelerometer_bias, self.gyro_bias]
         start = np.diag(np.repeat(spread, 3) ** 2)
-        return Belief(
-            seen.position.copy(),
-            seen.velocity.copy(),
-            seen.attitude.copy(),
+        return FilterState(
+            measurement.position.copy(),
+            measurement.velocity.copy(),
+            measurement.attitude.copy(),
             np.zeros((*lead, 6)),
             np.broadcast_to(start, (*lead, 15, 15)).copy(),
-            seen.rate.copy(),
+            measurement.rate.copy(),
             np.full((*lead, 4), np.inf),
         )
 
-    def navigate(self, belief: Belief, measurement: Measurement) -> Belief:
-        """Return the belief a period later, or at the same instant right after ``fix``."""
-        seen = measurement
-        aid = np.concatenate([seen.altitude, seen.ground_velocity], axis=-1)
-        found = kernels.move_and_correct(
-            *belief, seen.rate, seen.specific_force, aid, self._numbers
-        )
-        place, velocity, attitude, bias, covariance = found
-        return Belief(place, velocity, attitude, bias, covariance, seen.rate.copy(), aid)
+    def navigate(self, estimate: FilterState, measurement: Measurement) -> FilterState:
+        """Return the estimates a period later, or at the same instant right after ``fix``."""
+        rate, force = measurement.rate, measurement.specific_force
+        aid = np.concatenate([measurement.altitude, measurement.ground_velocity], axis=-1)
+        found = kernels.predict_and_correct(*estimate, rate, force, aid, self._numbers)
+        position, velocity, attitude, bias, covariance = found
+        return FilterState(position, velocity, attitude, bias, covariance, rate.copy(), aid)
 
-    def believed(self, belief: Belief, measurement: Measurement) -> Measurement:
-        """Return the measurement with what is believed in place of the place and the attitude."""
-        place, velocity, attitude = belief[:3]
-        rate = measurement.rate - belief.believed_bias[..., 3:]
-        return measurement._replace(position=place, velocity=velocity, attitude=attitude, rate=rate)
+    def estimated(self, estimate: FilterState, measurement: Measurement) -> Measurement:
+        """Return ``measurement`` with position, velocity, attitude and rate as estimated."""
+        position, velocity, attitude = estimate[:3]
+        rate = measurement.rate - estimate.believed_bias[..., 3:]
+        return measurement._replace(
+            position=position, velocity=velocity, attitude=attitude, rate=rate
+        )
 
     @cached_property
     def _numbers(self) -> Array:

@@ -1,7 +1,7 @@
 """The arithmetic of the lander's error-state filter, compiled.
 
-Errors and belief are in the order of ``lander_filter.Belief``; loops are plain, so that a vehicle
-has the same bits alone and in a batch.
+Errors and estimates are in the order of ``lander_filter.FilterState``. Sums are plain loops, so
+that a vehicle's numbers are bit for bit the same alone and in a batch.
 """
 
 # mypy: disable-error-code="no-untyped-call"
@@ -13,9 +13,9 @@ from numba import guvectorize, njit
 
 
 @njit
-def _turned(q: Any, x: Any, y: Any, z: Any) -> Any:
-    """Return q times the turn by the rotation vector (x, y, z)."""
-    angle = max(sqrt(x * x + y * y + z * z), 1e-150)  # without a branch: 0 / 0 would warn
+def _rotated(q: Any, x: Any, y: Any, z: Any) -> Any:
+    """Return q times the rotation by the rotation vector (x, y, z) [rad]."""
+    angle = max(sqrt(x * x + y * y + z * z), 1e-150)  # not zero: 0 / 0 would warn
     share = sin(0.5 * angle) / angle
     c, x, y, z = cos(0.5 * angle), share * x, share * y, share * z
     return (
@@ -39,7 +39,10 @@ def _matrix(q: Any) -> Any:
 
 @njit
 def _transition(r: Any, f: Any, w: Any, h: Any) -> Any:
-    """Return how the errors grow in a time ``h``, to first order, (15, 15)."""
+    """Return the errors' transition matrix (15, 15) over a time ``h`` [s], to first order.
+
+    ``r`` is R(q), ``f`` the specific force [m/s^2] and ``w`` the rate [rad/s], body axes.
+    """
     phi = np.eye(15)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -54,8 +57,8 @@ def _transition(r: Any, f: Any, w: Any, h: Any) -> Any:
 
 
 @njit
-def _grow(P: Any, phi: Any, numbers: Any, h: Any) -> None:
-    """Replace P by phi P phi^T + Q. Plain loops: the same bits alone and in a batch."""
+def _propagate(P: Any, phi: Any, numbers: Any, h: Any) -> None:
+    """Replace P by phi P phi^T + Q."""
     half = np.zeros((15, 15))
     for i in range(15):
         for k in range(15):
@@ -77,19 +80,23 @@ def _grow(P: Any, phi: Any, numbers: Any, h: Any) -> None:
 
 
 @njit
-def _agree(x: Any, P: Any, row: Any, surprise: Any, noise: Any) -> None:
-    """Add to the errors ``x``, and take from P, what one number tells of ``row`` times them."""
-    seen, spread = np.zeros(15), noise * noise
+def _correct(x: Any, P: Any, row: Any, innovation: Any, noise: Any) -> None:
+    """Update the errors ``x`` (15,) and P by one scalar measurement.
+
+    ``row`` (15,) is its sensitivity to the errors, ``innovation`` the measured less the predicted
+    value, ``noise`` its standard deviation.
+    """
+    covariance, variance = np.zeros(15), noise * noise
     for i in range(15):
         for j in range(15):
-            seen[i] += P[i, j] * row[j]
+            covariance[i] += P[i, j] * row[j]
     for i in range(15):
-        spread += row[i] * seen[i]
-        surprise -= row[i] * x[i]
+        variance += row[i] * covariance[i]
+        innovation -= row[i] * x[i]
     for i in range(15):
-        x[i] += seen[i] / spread * surprise
+        x[i] += covariance[i] / variance * innovation
         for j in range(15):
-            P[i, j] -= seen[i] * seen[j] / spread
+            P[i, j] -= covariance[i] * covariance[j] / variance
 
 
 @guvectorize(
@@ -97,52 +104,52 @@ def _agree(x: Any, P: Any, row: Any, surprise: Any, noise: Any) -> None:
     "(v),(v),(q),(b),(n,n),(v),(a),(v),(v),(a),(g)->(v),(v),(q),(b),(n,n)",
     cache=True,
 )
-def move_and_correct(
+def predict_and_correct(
     p: Any, v: Any, q: Any, b: Any, P: Any, last_rate: Any, last_aid: Any,
     rate: Any, force: Any, aid: Any, numbers: Any,
     p_: Any, v_: Any, q_: Any, b_: Any, P_: Any,
 ) -> None:  # fmt: skip
-    """Move the belief on by the inertial sensors, then correct it by the aids."""
+    """Predict the estimates by the inertial sensors, then correct them by the aiding sensors."""
     altimeter, velocimeter, mu, radius, period = numbers[4:]
     h = period if last_aid[0] < np.inf else 0.0
     f, w = np.empty(3), np.empty(3)
     for i in range(3):
         f[i], w[i] = force[i] - b[i], 0.5 * (last_rate[i] + rate[i]) - b[3 + i]
-    r = _matrix(_turned(q, 0.5 * h * w[0], 0.5 * h * w[1], 0.5 * h * w[2]))
-    away = sqrt(p[0] * p[0] + p[1] * p[1] + (radius + p[2]) * (radius + p[2]))
+    r = _matrix(_rotated(q, 0.5 * h * w[0], 0.5 * h * w[1], 0.5 * h * w[2]))
+    distance = sqrt(p[0] * p[0] + p[1] * p[1] + (radius + p[2]) * (radius + p[2]))
     for i in range(3):
         up = p[i] + (radius if i == 2 else 0.0)
-        felt = r[i, 0] * f[0] + r[i, 1] * f[1] + r[i, 2] * f[2]
-        v_[i] = v[i] + h * (felt - mu * up / (away * away * away))
+        force_w = r[i, 0] * f[0] + r[i, 1] * f[1] + r[i, 2] * f[2]
+        v_[i] = v[i] + h * (force_w - mu * up / (distance * distance * distance))
         p_[i] = p[i] + 0.5 * h * (v[i] + v_[i])
-    turned = _turned(q, h * w[0], h * w[1], h * w[2])
+    turned = _rotated(q, h * w[0], h * w[1], h * w[2])
     P_[:] = P
-    _grow(P_, _transition(r, f, w, h), numbers, h)
+    _propagate(P_, _transition(r, f, w, h), numbers, h)
 
     x, row = np.zeros(15), np.zeros(15)
     r = _matrix(turned)
     if aid[0] != last_aid[0]:
         row[2] = 1.0
-        _agree(x, P_, row, aid[0] - p_[2], altimeter)
+        _correct(x, P_, row, aid[0] - p_[2], altimeter)
         row[2] = 0.0
     if aid[1] != last_aid[1] or aid[2] != last_aid[2] or aid[3] != last_aid[3]:
-        own = np.empty(3)
+        velocity_b = np.empty(3)
         for i in range(3):
-            own[i] = r[0, i] * v_[0] + r[1, i] * v_[1] + r[2, i] * v_[2]
+            velocity_b[i] = r[0, i] * v_[0] + r[1, i] * v_[1] + r[2, i] * v_[2]
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             row[:] = 0.0
             row[3], row[4], row[5] = r[0, i], r[1, i], r[2, i]
-            # R^T v turns by own x theta.
-            row[6 + j], row[6 + k] = -own[k], own[j]
-            _agree(x, P_, row, aid[1 + i] - own[i], velocimeter)
+            # An attitude error theta changes R^T v by velocity_b x theta.
+            row[6 + j], row[6 + k] = -velocity_b[k], velocity_b[j]
+            _correct(x, P_, row, aid[1 + i] - velocity_b[i], velocimeter)
 
     for i in range(3):
         p_[i] += x[i]
         v_[i] += x[3 + i]
     for i in range(6):
         b_[i] = b[i] + x[9 + i]
-    turned = _turned(turned, x[6], x[7], x[8])
+    turned = _rotated(turned, x[6], x[7], x[8])
     length = sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2 + turned[3] ** 2)
     for i in range(4):
         q_[i] = turned[i] / length

@@ -7,7 +7,7 @@ from typing import Any
 from numba import guvectorize, njit
 
 POLAR, SCALED, FROZEN = 0.0, 1.0, 2.0
-"""In which coordinates the law sees its place; see ``lander.VariableStructure``."""
+"""Coordinates of the horizontal position; see ``lander.VariableStructure``."""
 
 
 @njit
@@ -17,7 +17,7 @@ def _wrapped(angle: Any) -> Any:
 
 @njit
 def clipped(value: Any, low: Any, high: Any) -> Any:
-    """Return ``value`` within limits; what is not a number stays so."""
+    """Return ``value`` within limits; NaN stays NaN."""
     if value < low:
         return low
     if value > high:
@@ -27,9 +27,9 @@ def clipped(value: Any, low: Any, high: Any) -> Any:
 
 @njit
 def euler(q: Any) -> Any:
-    """Return psi, phi, gamma [rad] of C = Rz(gamma) Ry(phi) Rx(psi), inertial to body.
+    """Return psi, phi, gamma [rad] of C = Rz(gamma) Ry(phi) Rx(psi), inertial to body axes.
 
-    ``q`` is in our axes. Of the paper's matrix, C^T = R(q) with the axes' places moved by one.
+    ``q`` is in our axes: C^T of the paper is R(q) with the axes permuted cyclically.
     """
     q0, q1, q2, q3 = q[0], q[3], q[1], q[2]
     across, along = 2.0 * (q0 * q3 - q1 * q2), q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3
@@ -39,11 +39,11 @@ def euler(q: Any) -> Any:
 
 
 @njit
-def _place(p: Any, v: Any, azimuth: Any, kind: Any, re: Any) -> Any:
-    """Return theta - theta_d and theta' as the gains want them, r, r', and the local azimuth.
+def _horizontal(p: Any, v: Any, azimuth: Any, kind: Any, re: Any) -> Any:
+    """Return theta - theta_d and theta' as K expects them, r, r', and the local azimuth.
 
-    Scaled: K is made for r = re, and a turn at r moves the vehicle by r/re of that (M3, erratum
-    16). Frozen: the axes stay those of the wanted azimuth, as theta is singular at r = 0 (M6).
+    Scaled: K is designed for r = re; a change of theta at r moves the vehicle by r/re of that at re
+    (M3, erratum 16). Frozen: along the desired azimuth, since theta is singular at r = 0 (M6).
     """
     if kind == FROZEN:
         c, s = cos(azimuth), sin(azimuth)
@@ -57,7 +57,7 @@ def _place(p: Any, v: Any, azimuth: Any, kind: Any, re: Any) -> Any:
 
 @njit
 def _needed_thrust(p: Any, acceleration: Any, mu: Any, radius: Any) -> Any:
-    """Return x_d'' + mu x_d / D [m/s^2], upwards."""
+    """Return the required thrust over mass x_d'' + mu x_d / D [m/s^2], upwards."""
     x = radius + p[2]
     square = x * x + p[0] * p[0] + p[1] * p[1]
     return acceleration[2] + mu * x / (square * sqrt(square))
@@ -71,15 +71,15 @@ def _needed_thrust(p: Any, acceleration: Any, mu: Any, radius: Any) -> Any:
 def variable_structure(
     q: Any, w: Any, p: Any, v: Any, q_d: Any, p_d: Any, v_d: Any, a_d: Any,
     K: Any, choices: Any, ka: Any, loop: Any, engine: Any, moon: Any,
-    Z: Any, S: Any, wanted: Any, given: Any,
+    Z: Any, S: Any, commanded: Any, limited: Any,
 ) -> None:  # fmt: skip
-    """Write Z, S, (F, b1, b2) as wanted, and within the engine's limits."""
+    """Write Z, S, and (F, b1, b2) before and within the engine's limits."""
     kind, mixes, follows = choices
     Fe, m, re, rho, delta, least, most, reach = engine
     azimuth, _, gamma_d = euler(q_d)
     psi, phi, gamma = euler(q)
     c, s = cos(azimuth), sin(azimuth)
-    turned, turning, r, away, local = _place(p, v, azimuth, kind, re)
+    turned, turning, r, away, local = _horizontal(p, v, azimuth, kind, re)
     r_d, away_d = c * p_d[0] + s * p_d[1], c * v_d[0] + s * v_d[1]
 
     alpha, tilt = _wrapped(psi - local), _wrapped(psi - azimuth)
@@ -92,7 +92,7 @@ def variable_structure(
     u = (0.0, 0.0, 0.0)
     for j in range(7):
         u = (u[0] + K[0, j] * Z[j], u[1] + K[1, j] * Z[j], u[2] + K[2, j] * Z[j])
-    # Rx(alpha) turns axes whose loops are of different speed: Ka^-1 belongs inside (M5).
+    # Rx(alpha) mixes axes whose loops have different speeds: Ka^-1 belongs inside (M5).
     k2, k3 = (ka[1], ka[2]) if mixes else (1.0, 1.0)
     u2, u3 = u[1] / k2, u[2] / k3
     climb = v[2] - v_d[2]
@@ -101,12 +101,12 @@ def variable_structure(
     S[2] = loop[2] * (ka[2] * w[1] + k3 * (ca * u3 - sa * u2))
 
     for i in range(3):
-        wanted[i] = -S[i] - rho * tanh(rho * S[i] / delta)
+        commanded[i] = -S[i] - rho * tanh(rho * S[i] / delta)
     if follows:
         upright = max(0.5, cos(phi) * cos(gamma))
-        wanted[0] = m * (_needed_thrust(p_d, a_d, moon[0], moon[1]) + wanted[0]) / upright
+        commanded[0] = m * (_needed_thrust(p_d, a_d, moon[0], moon[1]) + commanded[0]) / upright
     else:
-        wanted[0] += Fe
-    given[0] = clipped(wanted[0], least, most)
-    given[1] = clipped(wanted[1], -reach, reach)
-    given[2] = clipped(wanted[2], -reach, reach)
+        commanded[0] += Fe
+    limited[0] = clipped(commanded[0], least, most)
+    limited[1] = clipped(commanded[1], -reach, reach)
+    limited[2] = clipped(commanded[2], -reach, reach)

@@ -1,4 +1,4 @@
-"""The gain of the lander's virtual controls by linear-quadratic regulation, paper 003, (31)."""
+"""Linear-quadratic gain of the lander's virtual controls, paper 003, (31)."""
 
 import numpy as np
 from scipy.linalg import solve_continuous_are
@@ -12,10 +12,10 @@ PRINTED = np.array(
         [-0.001, 0.0, 0.0, 0.0218, -0.374, 0.0, 0.0],
     ]
 )
-"""K of table 4: rows of (x', w2L, w3L) over z3 to z9, SI and radians.
+"""K of table 4 (3, 7): rows for (x', w2L, w3L), columns for z3 to z9, SI and radians.
 
-Its third row has the wrong sign (erratum 10), for which a negative k3 makes up; 1062.5 should read
-1062.9, and others are cut, not rounded (erratum 11).
+The third row has the wrong sign (erratum 10), which a negative k3 compensates. 1062.5 should read
+1062.9, and other entries are truncated, not rounded (erratum 11).
 """
 STATE_WEIGHTS = np.diag([1e2, 1e9, 4e12, 1e3, 7e6, 7e6, 1e2])
 """Q of section 4, over z3 to z9."""
@@ -26,9 +26,9 @@ CONTROL_WEIGHTS = np.diag([1e3, 5e6, 1e8])
 def controllable_part(thrust_acceleration: float = 1.6, radius: float = 1e4) -> tuple[Array, Array]:
     """Return A (7, 7) and B (7, 3) of z3 to z9 under the virtual controls (x', w2L, w3L).
 
-    z = (r, (theta - alpha)/sqrt 2, -theta', -r', gammaL, -phiL, x): the paper's own T gives these
-    signs, its list of z others (erratum 12). ``thrust_acceleration`` is Fe/m [m/s^2], ``radius`` is
-    re [m].
+    z = (r, (theta - alpha)/sqrt 2, -theta', -r', gammaL, -phiL, x): these signs follow from the
+    paper's T; its list of z has others (erratum 12). ``thrust_acceleration`` is Fe/m [m/s^2],
+    ``radius`` is re [m].
     """
     a, b = np.zeros((7, 7)), np.zeros((7, 3))
     a[0, 3], a[1, 2] = -1.0, -np.sqrt(2.0)
@@ -40,9 +40,9 @@ def controllable_part(thrust_acceleration: float = 1.6, radius: float = 1e4) -> 
 def lqr_gain(
     state_weights: Array = STATE_WEIGHTS, control_weights: Array = CONTROL_WEIGHTS
 ) -> Array:
-    """Return K (3, 7) of (30), X2L = -K z, by the Riccati equation.
+    """Return K (3, 7) of X2L = -K z, (30), from the algebraic Riccati equation.
 
-    ``state_weights`` (7, 7) and ``control_weights`` (3, 3) are the paper's Q and R.
+    ``state_weights`` (7, 7) and ``control_weights`` (3, 3) are Q and R.
     """
     a, b = controllable_part()
     cost = solve_continuous_are(a, b, state_weights, control_weights)

@@ -1,4 +1,4 @@
-"""Control by magnetic moments: B-dot against a tumble, and the unloading of wheels that point."""
+"""Control by magnetic moments: B-dot detumbling, and unloading of reaction wheels."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
@@ -11,57 +11,57 @@ from ..attitude.linear_quadratic import Regulator, Signals
 
 
 class DipoleCommand(NamedTuple):
-    """What a law asks of magnetorquers."""
+    """Command to magnetorquers."""
 
     dipole: Annotated[Array, Unit("A m^2")]
     """Magnetic moment, body axes [A m^2], (..., 3)."""
 
 
 class Command(NamedTuple):
-    """What wheels and magnetorquers are asked for."""
+    """Command to wheels and magnetorquers."""
 
     torque: Annotated[Array, Unit("N m")]
-    """Of the wheels on the bus, body axes [N m], (..., 3)."""
+    """Torque of the wheels on the bus, body axes [N m], (..., 3)."""
     dipole: Annotated[Array, Unit("A m^2")]
     """Magnetic moment, body axes [A m^2], (..., 3)."""
 
 
 class LastField(NamedTuple):
-    """What ``BDot`` remembers."""
+    """Memory of ``BDot``."""
 
     field: Array
-    """Of the last period, body axes [T], (..., 3)."""
+    """Magnetic field measured in the last period, body axes [T], (..., 3)."""
 
 
 class FieldRate(NamedTuple):
-    """What ``BDot`` knows."""
+    """Signals of ``BDot``."""
 
     field_rate: Array
-    """In body axes [T/s], (..., 3): the mean over the last period."""
+    """Mean derivative of the field's body components over the last period [T/s], (..., 3)."""
 
 
 @dataclass(frozen=True)
 class BDot(Gains):
-    """m = -k dB/dt, by the magnetometer alone: whatever turns the body in the field is braked.
+    """m = -k dB/dt, from the magnetometer alone: damps the rotation relative to the field.
 
     Stickler and Alfriend, Elementary magnetic attitude control system, J. Spacecraft and Rockets
-    13, 1976. What is left turns with the field: 1.8 n over the poles of a dipole.
+    13, 1976. The remaining rate is that of the field's direction: 1.8 n over the poles of a dipole.
     """
 
     rate_gain: float = gain("A m^2 s/T", above=0.0)
     """k."""
     control_period: float = gain("s", above=0.0)
-    """From one reading to the next."""
+    """Time from one reading to the next."""
     batched = True
 
     def reset(self, measurement: Measurement, reference: Reference) -> LastField:
-        """Return the field at the start."""
+        """Return the initial state: the field measured at the start."""
         return LastField(measurement.magnetic_field.copy())
 
     def step(
         self, state: LastField, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[LastField, DipoleCommand, FieldRate]:
-        """Return the moment [A m^2] against the field's change since the last period."""
+        """Return the next state, the moment [A m^2] and the field's derivative."""
         field = measurement.magnetic_field
         change = (field - state.field) / self.control_period
         return LastField(field.copy()), DipoleCommand(-self.rate_gain * change), FieldRate(change)
@@ -69,10 +69,11 @@ class BDot(Gains):
 
 @dataclass(frozen=True)
 class MagneticUnloading(Regulator):
-    """m = k (h x B)/B^2, whose torque takes from h what is across the field: -k h_perp.
+    """m = k (h x B)/B^2: its torque -k h_perp unloads the momentum perpendicular to the field.
 
-    R. Vazquez, Control activo de la actitud, Univ. Sevilla 2016, erratum 27: a moment gives m x B,
-    and nothing along B. The wheels are told of the torque, so that the attitude does not feel it.
+    R. Vazquez, Control activo de la actitud, Univ. Sevilla 2016, erratum 27: a moment gives the
+    torque m x B, which has no component along B. The torque is fed forward to the wheels, so that
+    it does not disturb the attitude.
     """
 
     unloading_gain: float = gain("1/s", default=1e-3, at_least=0.0)
@@ -81,15 +82,15 @@ class MagneticUnloading(Regulator):
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[Any, Any, Signals]:
-        """Return the torque of the wheels and the moment of the coils."""
-        state, wheels, shown = super().step(state, time, measurement, reference)
-        dipole, brought = _shed.ufunc(shown.h, measurement.magnetic_field, self.unloading_gain)
-        return state, Command(wheels.torque - brought, dipole), shown
+        """Return the regulator's state and signals, and the wheels' torque and coils' moment."""
+        state, wheels, signals = super().step(state, time, measurement, reference)
+        dipole, torque = _unload.ufunc(signals.h, measurement.magnetic_field, self.unloading_gain)
+        return state, Command(wheels.torque - torque, dipole), signals
 
 
 @numba.guvectorize(["void(f8[:],f8[:],f8,f8[:],f8[:])"], "(k),(k),()->(k),(k)", cache=True)
-def _shed(h: Any, B: Any, k: Any, m: Any, torque: Any) -> None:
-    """Give k (h x B)/B^2 and its torque m x B."""
+def _unload(h: Any, B: Any, k: Any, m: Any, torque: Any) -> None:
+    """Write m = k (h x B)/B^2 [A m^2] and its torque m x B [N m]."""
     share = k / (B[0] * B[0] + B[1] * B[1] + B[2] * B[2])
     m[0] = share * (h[1] * B[2] - h[2] * B[1])
     m[1] = share * (h[2] * B[0] - h[0] * B[2])

@@ -1,4 +1,4 @@
-"""No control at all: the wheels' motors are off, and what else moves, moves."""
+"""A law without control: the wheels' motors are off, other joints move freely."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from mjspace.contract import Measurement, Reference, TorqueCommand
 
 @dataclass(frozen=True)
 class Coast:
-    """A law that asks for nothing: for a vehicle with passive damping, or to see it tumble."""
+    """Commands zero torque: for a vehicle with passive damping, or for a free tumble."""
 
     batched = True
 
@@ -19,5 +19,5 @@ class Coast:
     def step(
         self, state: None, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[None, TorqueCommand, None]:
-        """Return zero torque [N m] of shape (..., 3), and nothing else."""
+        """Return zero torque [N m], shape (..., 3); there is no state and no signal."""
         return state, TorqueCommand(np.zeros_like(measurement.rate)), None

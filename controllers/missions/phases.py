@@ -1,6 +1,6 @@
-"""A mission in phases: a law made of laws, each flown until its condition for the next is met.
+"""A mission in phases: a sequence of laws, each flown until its end condition is met.
 
-All arrays may have leading vehicle axes: every vehicle is in a phase of its own.
+All arrays may have leading vehicle axes: every vehicle changes phase independently.
 """
 
 from collections import namedtuple
@@ -15,13 +15,13 @@ from mjspace.contract import TICK, Array, DesiredMotion, Gains, Law, Measurement
 
 @dataclass(frozen=True)
 class Until(Gains):
-    """When a phase is over: when all that is given here holds."""
+    """End condition of a phase: all conditions set here hold."""
 
     after: float = gain("s", default=0.0, at_least=0.0)
-    """Least time since it began [s]."""
+    """Least time since the phase began [s]."""
     signal: str = ""
-    """A field of the measurement or one of its components: ``rate``, ``rate[2]``; of a vector its
-    norm."""
+    """A field of the measurement, whose norm counts, or one of its components: ``rate``,
+    ``rate[2]``."""
     below: float = gain(default=np.inf, at_most=np.inf)
     """The signal must be less, in SI."""
     above: float = gain(default=-np.inf, at_least=-np.inf)
@@ -38,29 +38,29 @@ class Until(Gains):
             self._parsed()
 
     def holds(self, elapsed: Array, measurement: Measurement) -> Any:
-        """Return whether it is met ``elapsed`` [s] (...) after the phase began, (...)."""
+        """Tell where the condition holds, (...), ``elapsed`` [s] (...) after the phase began."""
         late = elapsed >= self.after - TICK
         if not self.signal:
             return late
         name, part = self._parsed()
-        seen = getattr(measurement, name)
-        value = np.sqrt(np.sum(seen * seen, axis=-1)) if part is None else seen[..., part]
+        field = getattr(measurement, name)
+        value = np.sqrt(np.sum(field * field, axis=-1)) if part is None else field[..., part]
         return late & (value < self.below) & (value > self.above)
 
     def _parsed(self) -> tuple[str, int | None]:
         name, bracket, part = self.signal.removesuffix("]").partition("[")
         if name not in Measurement._fields or (bracket and not part.isdigit()):
             have = ", ".join(Measurement._fields)
-            raise ValueError(f"until.signal: no {self.signal!r} is measured: have {have}")
+            raise ValueError(f"until.signal: got {self.signal!r}, should be one of {have}")
         return name, int(part) if bracket else None
 
 
 @dataclass(frozen=True)
 class Phase:
-    """One law of the mission, and when the next one takes over."""
+    """One law of the mission, with its end condition."""
 
     name: str
-    """Goes before the names of its state and signals: lower case, digits and underscores."""
+    """Prefix of the names of its state and signals: lower case, digits and underscores."""
     law: Law
     until: Until | None = None
     """The last phase has none."""
@@ -68,28 +68,28 @@ class Phase:
 
 @dataclass(frozen=True)
 class Phases:
-    """Laws one after the other; each begins anew with what is measured when its turn comes.
+    """A sequence of laws; each is reset with the measurement at the start of its phase.
 
-    The state has that of every law; the command has every field that any of them commands, zero in
-    phases whose law does not; the signals have every law's, no number while it does not fly.
+    The state contains that of every law. The command has every field that any law commands, zero in
+    the phases of other laws. The signals have those of every law, NaN while it does not fly.
     """
 
     phases: Sequence[Any]
-    """Tables with the keys of ``Phase``, whose ``law`` and ``until`` are tables again."""
+    """Tables with the keys of ``Phase``; ``law`` and ``until`` are tables, too."""
 
     def __post_init__(self) -> None:
         tables = isinstance(self.phases, Sequence) and not isinstance(self.phases, str)
         if not tables or not all(isinstance(table, Mapping) for table in self.phases):
             raise ValueError(f"phases: got {self.phases!r}, should be a list of tables")
-        given = tuple(_phase(number, table) for number, table in enumerate(self.phases))
-        object.__setattr__(self, "phases", given)
-        names = [phase.name for phase in given]
+        built = tuple(_phase(number, table) for number, table in enumerate(self.phases))
+        object.__setattr__(self, "phases", built)
+        names = [phase.name for phase in built]
         if not names or len(set(names)) < len(names):
-            raise ValueError(f"phases: wanted one or more, with names of their own; got {names}")
-        for number, phase in enumerate(given):
-            last = number == len(given) - 1
+            raise ValueError(f"phases: got {names}, should be one or more, with different names")
+        for number, phase in enumerate(built):
+            last = number == len(built) - 1
             if last != (phase.until is None):
-                how = "is the last and goes on: it has no" if last else "never ends: give it an"
+                how = "is the last and takes no" if last else "would never end: it needs an"
                 raise ValueError(f"phases.{number}: {phase.name!r} {how} until")
 
     @property
@@ -98,7 +98,7 @@ class Phases:
         return all(getattr(phase.law, "batched", False) for phase in self.phases)
 
     def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
-        """Return the state of the first phase; each law is stepped once, to see its arrays."""
+        """Return the initial state; each law is stepped once to find the shapes of its arrays."""
         lead = measurement.rate.shape[:-1]
         states: list[Any] = []
         commands: dict[str, Any] = {}
@@ -107,18 +107,16 @@ class Phases:
         signal_hints: dict[str, Any] = {}
         for phase in self.phases:
             states.append(phase.law.reset(measurement, reference))
-            _, command, shown = phase.law.step(states[-1], 0.0, measurement, reference)
+            _, command, own = phase.law.step(states[-1], 0.0, measurement, reference)
             commands |= {n: a.shape[len(lead) :] for n, a in _arrays(command).items()}
-            signals |= {
-                f"{phase.name}_{n}": a.shape[len(lead) :] for n, a in _arrays(shown).items()
-            }
+            signals |= {f"{phase.name}_{n}": a.shape[len(lead) :] for n, a in _arrays(own).items()}
             hints |= _annotations(command)
-            signal_hints |= {f"{phase.name}_{n}": a for n, a in _annotations(shown).items()}
+            signal_hints |= {f"{phase.name}_{n}": a for n, a in _annotations(own).items()}
         none = np.zeros((*lead, 1))
         values = {"phase": none, "began": none.copy()}
         for phase, state in zip(self.phases, states, strict=True):
             values |= {f"{phase.name}_{name}": array for name, array in _arrays(state).items()}
-        # What a state is made of goes with its type, so that a logged one can be flown from.
+        # The layout is stored in the state's type, so that a flight can start from a logged state.
         layout = _Layout(
             tuple(states),
             _tuple("Command", commands, hints=hints),
@@ -129,7 +127,7 @@ class Phases:
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
-        """Return (state, command, signals) of the law whose phase it is at ``time`` [s]."""
+        """Return (state, command, signals), those of the law that is active at ``time`` [s]."""
         phase, began = state.phase[..., 0], state.began[..., 0]
         due = np.zeros(phase.shape, dtype=bool)
         for number, spec in enumerate(self.phases[:-1]):
@@ -144,11 +142,13 @@ class Phases:
             if flies.any():
                 if (begins := flies & due).any():
                     memory = _where(begins, spec.law.reset(measurement, reference), memory)
-                flown, asked, shown = spec.law.step(memory, time, measurement, reference)
+                flown, own_command, own_signals = spec.law.step(
+                    memory, time, measurement, reference
+                )
                 memory = _where(flies, flown, memory)
-                for name, array in _arrays(asked).items():
+                for name, array in _arrays(own_command).items():
                     command[name] = _pick(flies, array, command[name])
-                for name, array in _arrays(shown).items():
+                for name, array in _arrays(own_signals).items():
                     field = f"{spec.name}_{name}"
                     signals[field] = _pick(flies, array, signals[field])
             after |= {f"{spec.name}_{name}": array for name, array in _arrays(memory).items()}
@@ -161,7 +161,7 @@ class Phases:
 
 @dataclass(frozen=True)
 class _Layout:
-    """What the laws' states look like, and the types of command and signals."""
+    """The laws' states as templates, and the types of command and signals."""
 
     states: tuple[Any, ...]
     command: Any
@@ -175,7 +175,7 @@ class _Layout:
 
 
 def _phase(number: int, table: Mapping[str, Any]) -> Phase:
-    """Return the phase that a table describes; ValueError for one that is none."""
+    """Return the phase that a table describes; ValueError if it does not describe one."""
     try:
         until = table.get("until")
         phase = Phase(**{**table, "until": None if until is None else Until(**until)})
@@ -183,18 +183,22 @@ def _phase(number: int, table: Mapping[str, Any]) -> Phase:
         keys = ", ".join(f.name for kind in (Phase, Until) for f in fields(kind))
         raise ValueError(f"phases.{number}: {error} (a phase and its until have {keys})") from None
     if not (isinstance(phase.name, str) and phase.name.isidentifier() and phase.name.islower()):
-        raise ValueError(f"phases.{number}.name: {phase.name!r}: write a word in lower case")
+        raise ValueError(
+            f"phases.{number}.name: got {phase.name!r}, should be a word in lower case"
+        )
     if not hasattr(phase.law, "step") or hasattr(phase.law, "inner"):
-        raise ValueError(f"phases.{number}.law: wanted a table with a law's kind, without inner")
+        raise ValueError(
+            f"phases.{number}.law: should be a table with the kind of a law that has no inner"
+        )
     return phase
 
 
 def _tuple(
     name: str, shapes: Mapping[str, Any], layout: Any = None, hints: Mapping[str, Any] = {}
 ) -> Any:
-    """Return a named tuple type with the fields of ``shapes``.
+    """Return a named tuple type with those fields and a class attribute ``layout``.
 
-    ``layout`` says what they hold, ``hints`` are their annotations, which carry the units.
+    ``hints`` are the annotations of the fields, which carry the units.
     """
     bare = namedtuple(name, list(shapes))  # type: ignore[misc]
     content = {"__slots__": (), "layout": layout or dict(shapes), "__annotations__": dict(hints)}
@@ -211,12 +215,12 @@ def _filled(kind: Any, lead: tuple[int, ...], value: float) -> dict[str, Any]:
 
 
 def _arrays(values: Any) -> dict[str, Any]:
-    """Return the arrays of a named tuple, of which there may be none."""
+    """Return the arrays of a named tuple by name; none where it is empty or None."""
     return {n: np.asarray(a) for n, a in values._asdict().items()} if values else {}
 
 
 def _where(chosen: Any, one: Any, other: Any) -> Any:
-    """Return the named tuple that is ``one`` where ``chosen`` (...), else the ``other``."""
+    """Return the named tuple with the values of ``one`` where ``chosen`` (...), else ``other``."""
     if not one:
         return one
     return type(one)(*(_pick(chosen, a, b) for a, b in zip(one, other, strict=True)))

@@ -1,7 +1,7 @@
-"""One motor on a bench follows a sinusoidal speed, and rejects the vibration of its rotor.
+"""One motor on a test bench tracks a sinusoidal speed and rejects the vibration of its rotor.
 
-Servín 2022 (paper 001), chapter 4, whose motor and gains are the defaults, but for the current's
-gain (erratum E21: 9e6 1/s needs steps of 3e-7 s).
+Servín 2022 (paper 001), chapter 4. Its motor and gains are the defaults, except for the current
+loop's gain (erratum E21: the printed 9e6 1/s needs steps of 3e-7 s).
 """
 
 from dataclasses import dataclass
@@ -20,22 +20,22 @@ class BenchState(NamedTuple):
     """Memory of the motor's loops."""
 
     speed_memory: Array
-    """Of the speed loop, (..., 1, 9)."""
+    """Memory of the speed loop, (..., 1, 9)."""
     voltage_integral: Array
-    """Of the current loop [A s], (..., 1, 2)."""
+    """Integrals of the current loop [A s], (..., 1, 2)."""
 
 
 class BenchSignals(NamedTuple):
-    """What the bench shows; each of shape (..., 1)."""
+    """Signals of the law, each of shape (..., 1)."""
 
     speed_error: Array
-    """Wanted less measured speed [rad/s]."""
+    """Desired less measured speed [rad/s]."""
     wanted_current: Array
-    """I_q* [A]."""
+    """I_q*: commanded current [A]."""
     vibration_hat: Array
-    """Believed vibration torque on the rotor [N m]."""
+    """Estimated vibration torque on the rotor [N m]."""
     phi_hat: Array
-    """Believed square of the vibration's cycles in a turn."""
+    """Estimate of psi^2, the square of the vibration's cycles per revolution."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class SpeedBench(Gains):
     control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
     amplitude: float = gain("rad/s", default=20.0)
-    """Of the wanted speed, amplitude sin(frequency t)."""
+    """Of the desired speed, amplitude sin(frequency t)."""
     frequency: float = gain("rad/s", default=0.5 * pi)
-    """Of the wanted speed."""
+    """Of the desired speed."""
     rotor_inertia: float = gain("kg m^2", default=0.016, above=0.0)
     """J."""
     pole_pairs: float = gain(default=6.0, at_least=1, whole=True)
@@ -63,46 +63,48 @@ class SpeedBench(Gains):
     speed_gain: float = gain("N m s/rad", default=8.0, above=0.0)
     """k_p."""
     integral_gain: float = gain("N m/rad", default=0.0, at_least=0.0)
-    """k_i, ours."""
+    """k_i; not in the thesis."""
     observer_gain: float = gain("N m s/rad", default=1.0, at_least=0.0)
     """k_o."""
     vibration_gain: float = gain("N m/rad", default=5.0, at_least=0.0)
-    """k_e; zero: no rejection."""
+    """k_e; zero: no rejection of vibration."""
     adaptation_gain: float = gain("1/(N m)^2", default=0.26, at_least=0.0)
-    """k_a; zero: psi^2 is known to be ``ratio``."""
+    """k_a; zero: psi^2 stays at ``ratio``."""
     ratio: float = gain(default=0.0, at_least=0.0)
-    """psi^2 to start from."""
+    """Initial psi^2."""
     current_gain: float = gain("1/s", default=3000.0, above=0.0)
     """k_ep; k_ei is k_ep R/L."""
     voltage_limit: float = gain("V", default=inf, above=0.0, at_most=inf)
     """Of the supply."""
     current_limit: float = gain("A", default=inf, above=0.0, at_most=inf)
-    """Largest wanted current."""
+    """Largest commanded current."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self._speed_loop, self._current_loop  # which refuse gains that cannot be
+        _ = self._speed_loop, self._current_loop  # refuse unstable gains
 
     def reset(self, measurement: Measurement, reference: Reference) -> BenchState:
-        """Return the state that knows of no vibration."""
+        """Return the initial state: no vibration is estimated."""
         speed = measurement.wheel_speed
         return BenchState(self._speed_loop.reset(speed), self._current_loop.reset(speed))
 
     def step(
         self, state: BenchState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[BenchState, VoltageCommand, BenchSignals]:
-        """Return the next state, the voltage and the estimates; the reference does not matter."""
+        """Return the next state, the voltage and the estimates; the reference is not used."""
         speed, current = measurement.wheel_speed, measurement.current
-        wanted = np.full_like(speed, self.amplitude * sin(self.frequency * time))
-        by_then = self.frequency * (time + 1.0 / self.current_gain)
-        slope = np.full_like(speed, self.amplitude * self.frequency * cos(by_then))
-        memory, asked = self._speed_loop.step(
-            state.speed_memory, current, speed, wanted, slope, np.zeros_like(speed)
+        desired = np.full_like(speed, self.amplitude * sin(self.frequency * time))
+        ahead = self.frequency * (time + 1.0 / self.current_gain)
+        slope = np.full_like(speed, self.amplitude * self.frequency * cos(ahead))
+        memory, commanded = self._speed_loop.step(
+            state.speed_memory, current, speed, desired, slope, np.zeros_like(speed)
         )
-        integral, voltage = self._current_loop.step(state.voltage_integral, current, asked, speed)
-        seen = estimates(memory)
-        shown = BenchSignals(wanted - speed, asked, seen.z1_hat, seen.phi_hat)
-        return BenchState(memory, integral), VoltageCommand(voltage), shown
+        integral, voltage = self._current_loop.step(
+            state.voltage_integral, current, commanded, speed
+        )
+        found = estimates(memory)
+        signals = BenchSignals(desired - speed, commanded, found.z1_hat, found.phi_hat)
+        return BenchState(memory, integral), VoltageCommand(voltage), signals
 
     @cached_property
     def _speed_loop(self) -> SpeedLoop:

@@ -1,16 +1,15 @@
-"""A motor's angle and speed from its currents and voltages alone, for motors that turn.
+"""Sensorless observer: a motor's angle and speed from its currents and voltages alone.
 
-An extended observer: the back-EMF is a state that turns with the rotor, beside the winding currents
-that it drives; a phase-locked loop reads angle and speed from it, and has as a state of its own the
-acceleration that nobody told it of. As complex numbers in the stator's axes, with Servín 2022
-(paper 001), (2.68), (2.69),
+An extended observer of the winding currents and of the back-EMF, which rotates with the rotor. A
+phase-locked loop extracts angle and speed from the back-EMF and estimates the unknown part of the
+acceleration. As complex numbers in the stator's axes, with Servín 2022 (paper 001), (2.68), (2.69),
 
     L i' = -R i + u - e,    e = j k_m W exp(j p theta).
 
-From step to step the voltage is held in these axes, and the back-EMF turns on.
+Over a step the voltage is constant in these axes, and the back-EMF rotates.
 
-The paper leaves speed control without a mechanical sensor to later work; this observer is ours. A
-rotor at rest has no back-EMF: it is for wheels that spin, not for gimbals.
+The paper leaves speed control without a mechanical sensor to future work; the observer is not from
+it. A rotor at rest has no back-EMF: the observer is for spinning wheels, not for gimbals.
 """
 
 from dataclasses import dataclass
@@ -26,7 +25,10 @@ from mjspace.contract import Array
 
 @dataclass(frozen=True)
 class SpeedObserver:
-    """Observes m motors at once; gains (m,) or one number for all where another gives m."""
+    """Observer of m motors.
+
+    A gain is (m,), or one number for all motors where another gain determines m.
+    """
 
     pole_pairs: Array | float
     """p."""
@@ -46,25 +48,27 @@ class SpeedObserver:
     def __post_init__(self) -> None:
         for name in ("bandwidth", "tracking_bandwidth"):
             if not np.all(np.asarray(getattr(self, name)) > 0.0):
-                raise ValueError(f"{name} is {getattr(self, name)} rad/s: more than zero would do")
+                raise ValueError(
+                    f"{name}: got {getattr(self, name)} rad/s, should be greater than zero"
+                )
 
     def reset(self, speed: Array) -> Array:
-        """Return the memory (..., m, 7) that believes a ``speed`` (..., m) and an angle of zero.
+        """Return the initial memory (..., m, 7) for a ``speed`` (..., m) [rad/s], at angle zero.
 
-        Its columns: the winding currents [A], the back-EMF [V], the electrical angle p theta [rad],
-        in [-pi, pi), the rotor's speed [rad/s] and its untold acceleration [rad/s^2]. The speed
-        must have the right sign.
+        Its columns: the two winding currents [A], the two components of the back-EMF [V], the
+        electrical angle p theta in [-pi, pi) [rad], the rotor's speed [rad/s], and the unknown part
+        of its acceleration [rad/s^2]. ``speed`` must have the right sign.
         """
         zero = np.zeros(speed.shape)
         emf = np.broadcast_to(self.torque_constant * speed, speed.shape)
         return np.stack([zero, zero, zero, emf, zero, speed, zero], axis=-1)
 
     def step(self, memory: Array, current: Array, voltage: Array, acceleration: Array) -> Array:
-        """Return the memory (..., m, 7) as of now.
+        """Return the memory (..., m, 7) at this instant.
 
-        ``current`` (..., m, 2) is measured in the windings now [A], ``voltage`` (..., m, 2) was
-        held on them since the last step [V]; both in the stator's axes (a, b).
-        ``acceleration`` (..., m) is what is known of the rotor's, k_m I_q / J for one [rad/s^2].
+        ``current`` (..., m, 2) [A] is measured in the windings now; ``voltage`` (..., m, 2) [V] was
+        held on them since the last step; both are in the stator's axes (a, b). ``acceleration``
+        (..., m) [rad/s^2] is the known part of the rotor's, for example k_m I_q / J.
         """
         after: Array = _observe.ufunc(memory, current, voltage, acceleration, self._gains)
         return after
@@ -74,7 +78,7 @@ class SpeedObserver:
         R, L, T = np.asarray(self.resistance), np.asarray(self.inductance), self.period
         a = np.exp(-T * R / L)
         b = (1.0 - a) / R
-        # The poles of each error at one place: quick for the currents, slower for the angle.
+        # Multiple poles: fast for currents and back-EMF, slower for angle and speed.
         d, c = (np.exp(-T * np.asarray(w)) for w in (self.bandwidth, self.tracking_bandwidth))
         rows = (self.pole_pairs, a, b, T, R, L)
         corrections = (1.0 - d * d / a, (1.0 - d) ** 2 / b)
@@ -84,18 +88,18 @@ class SpeedObserver:
 
 
 def turned(vector: Array, angle: Array) -> Array:
-    """Return currents or voltages (..., m, 2) turned by an ``angle`` (..., m) [rad]."""
-    after: Array = _turned.ufunc(vector, angle)
-    return after
+    """Return currents or voltages (..., m, 2) rotated by an ``angle`` (..., m) [rad]."""
+    rotated: Array = _turned.ufunc(vector, angle)
+    return rotated
 
 
 def held_in_stator(voltage: Array, angle: Array, swept: Array, limit: float = inf) -> Array:
-    """Return the windings' voltages (..., m, 2) that stand for one that turns with the rotor.
+    """Return constant winding voltages (..., m, 2) [V] with the mean of one that rotates.
 
-    ``voltage`` (..., m, 2) is wanted in the rotor's axes, which are at the electrical ``angle``
-    (..., m) [rad] now and will be ``swept`` (..., m) further when the period ends: held in the
-    stator's axes at their middle, and as much longer as its mean in theirs would be too short; no
-    longer than the supply's ``limit`` [V].
+    ``voltage`` (..., m, 2) [V] is desired in the rotor's axes. These are at the electrical
+    ``angle`` (..., m) [rad] now and ``swept`` (..., m) [rad] further at the end of the period. The
+    result is along ``voltage`` at mid-period; it is lengthened so that its mean in the rotor's axes
+    is right, up to the supply's ``limit`` [V].
     """
     after: Array = _held.ufunc(voltage, angle, swept, limit)
     return after
@@ -130,20 +134,20 @@ def _held(voltage: Any, angle: Any, swept: Any, limit: Any, after: Any) -> None:
 def _observe(
     memory: Any, current: Any, voltage: Any, acceleration: Any, gains: Any, after: Any
 ) -> None:
-    """Predict over the last period, then correct by what is measured now."""
+    """Predict over the last period, then correct by the measured current."""
     for n in range(memory.shape[0]):
         p, a, b, period = gains[0, n], gains[1, n], gains[2, n], gains[3, n]
         R, L = gains[4, n], gains[5, n]
         i = complex(memory[n, 0], memory[n, 1])
         e = complex(memory[n, 2], memory[n, 3])
-        angle, untold = memory[n, 4], memory[n, 6]
-        grown = period * (acceleration[n] + untold)
+        angle, unknown = memory[n, 4], memory[n, 6]
+        grown = period * (acceleration[n] + unknown)
         speed = memory[n, 5] + 0.5 * grown  # in the middle of the period
 
         swept = p * speed * period
         turn = complex(np.cos(swept), np.sin(swept))
         i = a * i + b * complex(voltage[n, 0], voltage[n, 1])
-        i -= e * (turn - a) / complex(R, p * speed * L)  # the voltage is held, the back-EMF turns
+        i -= e * (turn - a) / complex(R, p * speed * L)  # constant voltage, rotating back-EMF
         e = e * turn
         sure = abs(speed) > abs(grown)
         e *= 1.0 + (grown if sure else 0.0) / (speed if sure else 1.0)  # as the speed grows
@@ -154,13 +158,13 @@ def _observe(
         i += gains[6, n] * missed
         e -= gains[7, n] * missed
 
-        # e = j k_m W exp(j angle): its part along exp(j angle) shows the angle's error.
+        # e = j k_m W exp(j angle): its part along exp(j angle) measures the angle's error.
         cos, sin = np.cos(angle), np.sin(angle)
         along, across = e.real * cos + e.imag * sin, e.imag * cos - e.real * sin
         ahead = -np.arctan2(along, across) if speed > 0.0 else -np.arctan2(-along, -across)
         angle += gains[8, n] * ahead
         speed += gains[9, n] * ahead / p
-        untold += gains[10, n] * ahead / p
+        unknown += gains[10, n] * ahead / p
         angle -= 2.0 * np.pi * np.floor(angle / (2.0 * np.pi) + 0.5)
         after[n, 0], after[n, 1], after[n, 2], after[n, 3] = i.real, i.imag, e.real, e.imag
-        after[n, 4], after[n, 5], after[n, 6] = angle, speed, untold
+        after[n, 4], after[n, 5], after[n, 6] = angle, speed, unknown

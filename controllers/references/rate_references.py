@@ -1,6 +1,6 @@
-"""A wanted motion given by its rate: the attitude is integrated, to rounding, from where it starts.
+"""A desired motion defined by its rate: the attitude is integrated to rounding error.
 
-The quaternion's path is continuous, as a law needs it that picks one of q and -q at its start.
+The quaternion's path is continuous, as required by a law that chooses q or -q once at its start.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ _BLOCK = 64  # steps
 
 @dataclass(frozen=True)
 class Sinusoids(Gains):
-    """Rates A sin(w t + phase) on the three desired axes, and the attitude that they lead to.
+    """Rates A sin(w t + phase) on the three desired axes, with the attitude that follows from them.
 
-    The motion of Servín Aguilar 2022 (paper 001), chapter 3, and with a phase of 90 deg on the
-    first axis of chapter 5. The attitude has no closed form. It is integrated by Magnus' method of
-    order six (Blanes, Casas and Ros 2000, "Improved high order integrators based on the Magnus
-    expansion", BIT 40) on a grid of its own, from time zero both ways, and by one shorter step from
-    the grid to the time asked for: what it is at a time does not depend on what was asked before.
+    The motion of Servín Aguilar 2022 (paper 001), chapter 3; with a phase of 90 deg on the first
+    axis that of chapter 5. The attitude has no closed form. It is integrated by the sixth-order
+    Magnus method (Blanes, Casas and Ros 2000, "Improved high order integrators based on the Magnus
+    expansion", BIT 40) on a fixed grid, from time zero in both directions, with one shorter step
+    from the grid to the requested time: the result does not depend on earlier calls.
     """
 
     amplitude: Array = gain("rad/s", (3,), default=(0.125, 0.075, 0.035))
@@ -35,9 +35,9 @@ class Sinusoids(Gains):
     phase: Array = gain("rad", (3,), default=(0.0, 0.0, 0.0))
     """Of each axis; 90 deg makes a cosine."""
     start_mrp: Array = gain(shape=(3,), default=(0.1707, 0.1205, 0.0621))
-    """Attitude at time zero, modified Rodrigues parameters, desired axes to inertial; either set.
+    """Attitude at time zero, modified Rodrigues parameters of either set, desired to inertial axes.
 
-    Table 3.1; section 5.3 prints 0.1502 for the second (E23: undecidable).
+    Table 3.1; section 5.3 prints 0.1502 for the second component (E23: undecidable).
     """
 
     def at(self, time: Array) -> Reference:
@@ -62,14 +62,14 @@ class Sinusoids(Gains):
 
     @cached_property
     def _blocks(self) -> dict[tuple[float, int], Array]:
-        """Attitudes on the grid that have been needed: (1.0 or -1.0 for the way, number)."""
+        """Computed blocks of attitudes on the grid, by (direction in time 1.0 or -1.0, number)."""
         return {}
 
     def _block(self, way: float, number: int) -> Array:
         """Return the attitudes (65, 4) on the grid from step 64 ``number`` on.
 
-        Blocks are of one size, and each starts where the one before it ends: the same bits whatever
-        is asked for first, and by however many threads.
+        Blocks have a fixed size, and each starts at the end of the one before: the same bits for
+        any order of calls and any number of threads.
         """
         for n in range(number + 1):
             if (way, n) in self._blocks:
@@ -91,8 +91,8 @@ class Sinusoids(Gains):
     def _turn(self, time: Array, step: Array) -> Array:
         """Return the rotation vectors (n, 3) [rad] of one step [s] from each ``time`` [s] on.
 
-        The rate is seen at three Gauss points. The commutator of two rotations' generators is the
-        cross product; R' = R S(w) multiplies from the right, which turns its sign.
+        The rate is sampled at three Gauss points. The commutator of two rotations' generators is
+        the cross product; R' = R S(w) multiplies from the right, which reverses its sign.
         """
         h, reach = step[:, None], np.sqrt(0.15) * step
         early, mid, late = (self._rate(time + 0.5 * step + d) for d in (-reach, 0.0, reach))

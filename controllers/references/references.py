@@ -1,7 +1,6 @@
-"""Wanted motions: attitude, rate and acceleration as pure functions of time.
+"""Desired motions: attitude, rate and acceleration as pure functions of time.
 
-Each keeps the quaternion's path continuous, so a law that picks one of q and -q at the start of a
-flight never has to pick again.
+The quaternion's path is continuous, so that a law can choose q or -q once, at the start.
 """
 
 from dataclasses import dataclass
@@ -27,10 +26,10 @@ class Hold(Gains):
 
 @dataclass(frozen=True)
 class Turning(Gains):
-    """A turn at a constant rate: of axes that look at the planet from a circular orbit."""
+    """A rotation at a constant rate, as of nadir-pointing axes in a circular orbit."""
 
     rate: Array = gain("rad/s", (3,))
-    """In the axes that turn."""
+    """In the rotating axes."""
     attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0), form="quaternion")
     """At time zero: quaternion, scalar first, body to inertial; normalized."""
 
@@ -45,13 +44,13 @@ class Slew(Gains):
     """A rest-to-rest turn about the eigenaxis, the shorter way, with a quintic angle."""
 
     attitude: Array = gain(shape=(4,), form="quaternion")
-    """Where it ends: quaternion, scalar first, body to inertial; normalized."""
+    """Final attitude: quaternion, scalar first, body to inertial; normalized."""
     duration: float = gain("s", above=0.0)
     """From rest to rest."""
     start_time: float = gain("s", default=0.0)
-    """Held at ``start_attitude`` until then."""
+    """Start of the slew; until then ``start_attitude`` is held."""
     start_attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0), form="quaternion")
-    """Where it starts."""
+    """Initial attitude: quaternion, scalar first, body to inertial; normalized."""
 
     def at(self, time: Array) -> Reference:
         """Return the slew at each ``time`` [s]; held before it starts and after it ends."""
@@ -64,8 +63,8 @@ class Slew(Gains):
 class Regulation(Gains):
     """A rest-to-rest turn from the identity about one axis, of any angle, with a quintic angle.
 
-    The reconstruction of Servín 2022 (paper 002), figures 4.9 and 4.10: "120 deg, acceleration
-    lasting 2 s".
+    Reconstructed from Servín 2022 (paper 002), figures 4.9 and 4.10: "120 deg, acceleration lasting
+    2 s".
     """
 
     angle: float = gain("rad", default=2.0 * np.pi / 3.0)
@@ -85,15 +84,15 @@ class Regulation(Gains):
 class Sweep(Gains):
     """A turn from the identity about one axis: speed up, cruise, slow down, hold.
 
-    The reconstruction of Servín 2022 (paper 002), figures 3.1 and 3.2; the ramps are cubic in rate.
+    Reconstructed from Servín 2022 (paper 002), figures 3.1 and 3.2; the ramps are cubic in rate.
     """
 
     peak_rate: float = gain("rad/s", default=np.pi / 6.0)
     """While cruising."""
     ramp: float = gain("s", default=2.0, above=0.0)
-    """How long it takes to reach the peak rate, and to come to rest again."""
+    """Duration of the acceleration to the peak rate, and of the deceleration to rest."""
     cruise_end: float = gain("s", default=4.0, above=0.0)
-    """When it starts to slow down; the whole turn is peak_rate times this."""
+    """Start of the deceleration; the whole angle is peak_rate times this."""
     axis: Array = gain(shape=(3,), default=(1.0, 1.0, 1.0), form="direction")
     """Of the turn; normalized."""
 
@@ -107,13 +106,13 @@ class Sweep(Gains):
 
     def at(self, time: Array) -> Reference:
         """Return the sweep at each ``time`` [s]."""
-        # Slowing down is speeding up taken away: each ramp turns s^3 - s^4/2 of ramp, then 1 s a s.
+        # The difference of two equal ramps, shifted by cruise_end.
         up, down = (self._ramp(time - start) for start in (0.0, self.cruise_end))
         vector = self.peak_rate * att.normalize(self.axis)
         return _turn(_IDENTITY, vector, (up[0] - down[0], up[1] - down[1], up[2] - down[2]))
 
     def _ramp(self, time: Array) -> tuple[Array, Array, Array]:
-        """Return the integral of a smooth step from 0 to 1, the step, and its derivative."""
+        """Return the integral of the smooth step s^2 (3 - 2 s), the step, and its derivative."""
         s = np.clip(time / self.ramp, 0.0, 1.0)
         turned = self.ramp * (s**3 - 0.5 * s**4) + np.maximum(time - self.ramp, 0.0)
         return turned, 3.0 * s**2 - 2.0 * s**3, 6.0 * s * (1.0 - s) / self.ramp
@@ -121,9 +120,9 @@ class Sweep(Gains):
 
 @dataclass(frozen=True)
 class MultiAxis(Gains):
-    """Roll, pitch and yaw A (1 - cos w t): from rest at the identity, about ever other axes.
+    """Roll, pitch and yaw A (1 - cos w t): from rest at the identity, about changing axes.
 
-    Not in Servín 2022 (paper 002), whose motions about a fixed axis leave its nine parameters
+    Not from Servín 2022 (paper 002), whose motions about a fixed axis leave its nine parameters
     unobservable.
     """
 
@@ -167,7 +166,10 @@ _IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def _turn(start: Array, vector: Array, part: tuple[Array, Array, Array]) -> Reference:
-    """Return a turn from ``start`` by ``vector`` times a part; given its derivatives too."""
+    """Return a rotation from ``start`` (4,) by ``vector`` (3,) [rad] times a fraction of time.
+
+    ``part`` has the fraction, its first derivative [1/s] and its second [1/s^2], each (n,).
+    """
     turned, rate, acceleration = (p[:, None] * vector for p in part)
     return Reference(att.multiply(start, att.from_rotation_vector(turned)), rate, acceleration)
 
@@ -200,6 +202,6 @@ def _from_euler(x: Array, dx: Array, ddx: Array) -> Reference:
 def _require_regular(reach: Array) -> None:
     if not abs(reach[1]) < 0.5 * np.pi:
         raise ValueError(
-            f"amplitude[1] makes pitch reach {np.degrees(abs(reach[1])):.1f} deg: "
-            "less than 90 deg keeps clear of the singularity"
+            f"amplitude[1]: pitch reaches {np.degrees(abs(reach[1])):.1f} deg, "
+            "should be less than 90 deg, where Euler angles are singular"
         )

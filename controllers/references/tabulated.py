@@ -16,22 +16,21 @@ _SLOW = 0.05  # of the largest rate: what counts as rest at an end of the table
 
 @dataclass(frozen=True)
 class Table(Gains):
-    """Attitudes at given times, on a curve of continuous acceleration.
+    """A smooth curve through tabulated attitudes, with continuous acceleration.
 
-    The curve is a cubic spline through the quaternions, each with the sign nearer to the one before
-    it, normalized: its path never jumps. By default the motion comes to rest at the first and the
-    last time, whatever the rows near them say, and holds those attitudes before and after; where
-    the rows move there, a warning says so. ``ends`` can be another choice, under which the spline
-    ends with the rate of its rows ("not-a-knot").
+    The curve is a cubic spline through the quaternions, normalized; each quaternion takes the sign
+    nearer to the one before, so that the path is continuous. By default the motion is at rest at
+    the first and the last time and holds these attitudes before and after; a warning reports rows
+    that move there. With other ``ends`` the spline is not-a-knot and keeps the rate of its rows.
     """
 
     time: Array = gain("s", ("row",), form="increasing")
-    """Increasing."""
+    """Times of the rows, increasing."""
     attitude: Array = gain(shape=("row", 4), form="quaternion")
     """Quaternion at each time, scalar first, body to inertial, of either sign."""
     ends: Literal["rest", "continue", "refuse"] = "rest"
-    """At the first and last time: "rest"; "continue" to turn at the rate reached there; or "refuse"
-    to fly a scenario that goes beyond them."""
+    """At the first and last time: "rest"; "continue" to rotate on at the rate reached there; or
+    "refuse" times beyond them."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -46,7 +45,7 @@ class Table(Gains):
         """Return the curve at each ``time`` [s], shape (n,).
 
         Raises:
-            ValueError: a time is outside the table, which is to refuse it.
+            ValueError: a time is outside the table and ``ends`` is "refuse".
         """
         inside = np.clip(time, self.time[0], self.time[-1])
         beyond = time - inside
@@ -90,7 +89,7 @@ _ENDS = ("rest", "continue", "refuse")
 def _motion(spline: CubicSpline, time: Array) -> tuple[Array, Array, Array]:
     """Return attitude (n, 4), rate [rad/s] and acceleration [rad/s^2] (n, 3) on the spline."""
     s, ds, dds = (spline(time, order) for order in range(3))
-    # With q = s/|s|, the change of |s| is along q, so in the scalar part of conj(q) q' alone.
+    # With q = s/|s|, a change of |s| affects the scalar part of conj(q) q' alone.
     square = np.sum(s * s, axis=-1, keepdims=True)
     growth = 2.0 * np.sum(s * ds, axis=-1, keepdims=True) / square
     rate = 2.0 * att.multiply(att.conjugate(s), ds)[..., 1:] / square

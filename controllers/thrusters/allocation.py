@@ -1,4 +1,4 @@
-"""From a wanted torque and force to on-times of thrusters, which can only push.
+"""Allocation: from a desired torque and force to on-times of thrusters, which can only push.
 
 All arrays may have leading vehicle axes.
 """
@@ -14,38 +14,39 @@ _SMALL = 1e-12
 
 
 def effect(positions: Array, directions: Array, force: Array) -> Array:
-    """Return the torque [N m] and force [N] of each thruster that is on, shape (6, n), body axes.
+    """Return the torque [N m] and force [N] of each thruster that is on, body axes, shape (6, n).
 
-    ``positions`` (n, 3) [m] are about the centre of mass, ``directions`` (n, 3) are unit vectors of
-    the force on the vehicle, ``force`` (n,) [N].
+    ``positions`` (n, 3) [m] are from the centre of mass, ``directions`` (n, 3) are unit vectors of
+    the force on the vehicle, ``force`` (n,) [N] is each thruster's.
     """
     pushes = force[:, None] * directions
     return np.concatenate([np.cross(positions, pushes), pushes], axis=1).T
 
 
-def share(wanted: Array, effects: Array) -> Array:
-    """Return the shares x >= 0 (..., n) that minimize |effects x - wanted|.
+def share(desired: Array, effects: Array) -> Array:
+    """Return the shares x >= 0 (..., n) that minimize |effects x - desired|.
 
-    ``wanted`` (..., m) has the units of ``effects`` (m, n), whose columns are what each thruster
-    does when it is on all the time; a share above one is more than it can. At most m of them are
-    not zero. Lawson and Hanson 1974, "Solving Least Squares Problems", chapter 23.
+    A share is a thruster's fraction of the time; above one it exceeds the thruster's capability.
+    ``effects`` (m, n) has a column for each thruster that is on continuously, ``desired`` (..., m)
+    the same units. At most m shares are not zero. Lawson and Hanson 1974, "Solving Least Squares
+    Problems", chapter 23.
     """
-    found: Array = _share.ufunc(wanted, effects)
+    found: Array = _share.ufunc(desired, effects)
     return found
 
 
 def within(shares: Array) -> tuple[Array, Array]:
-    """Return (shares no larger than one, the factor that they shrank by), (..., n) and (..., 1)."""
+    """Return (shares scaled to at most one, the scale factor), (..., n) and (..., 1)."""
     factor = 1.0 / np.maximum(shares.max(axis=-1, keepdims=True), 1.0)
     return factor * shares, factor
 
 
 def pulses(shares: Array, carry: Array, period: float, minimum_on: float) -> tuple[Array, Array]:
-    """Return (on-times [s], what is carried over [s]), each (..., n), for one control period.
+    """Return (on-times [s], remainders [s]), each (..., n), for one control period.
 
-    Each thruster is to be on for its share, at most one, of the ``period`` [s]. Less than
-    ``minimum_on`` [s] is not fired but added to what is asked for next, and so is what would not
-    fit into the period: so the mean is right in the long run.
+    Each thruster should be on for its share, at most one, of the ``period`` [s]. ``carry`` (..., n)
+    [s] is the remainder of the last period. On-times below ``minimum_on`` [s], and what exceeds the
+    period, are not fired but carried over, so that the mean is right in the long run.
     """
     due = shares * period + carry
     on_time = np.where(due < minimum_on, 0.0, np.minimum(due, period))
@@ -56,21 +57,21 @@ def pattern(axis: Array, effects: Array) -> Array:
     """Return the shares (n,), the largest of them one, of a pure torque about ``axis`` (3,).
 
     Raises:
-        ValueError: the thrusters cannot turn the vehicle about it without a push or another turn.
+        ValueError: the thrusters cannot make this torque without a net force or another torque.
     """
-    wanted = np.concatenate([axis, np.zeros(3)])
-    shares = share(wanted, effects)
-    if not np.allclose(effects @ shares, wanted, atol=1e-9):
+    desired = np.concatenate([axis, np.zeros(3)])
+    shares = share(desired, effects)
+    if not np.allclose(effects @ shares, desired, atol=1e-9):
         raise ValueError(f"the thrusters make no pure torque about {np.asarray(axis).tolist()}")
     most: Array = shares / shares.max()
     return most
 
 
 @njit(cache=True)
-def _least_squares(effects: Any, wanted: Any, chosen: Any, count: int, solution: Any) -> None:
-    """Solve for the ``chosen`` columns by modified Gram-Schmidt: they are independent."""
-    m = wanted.size
-    q, r, left = np.empty((count, m)), np.zeros((count, count)), wanted.copy()
+def _least_squares(effects: Any, desired: Any, chosen: Any, count: int, solution: Any) -> None:
+    """Solve for the ``chosen`` columns, which are independent, by modified Gram-Schmidt."""
+    m = desired.size
+    q, r, left = np.empty((count, m)), np.zeros((count, count)), desired.copy()
     for j in range(count):
         for i in range(m):
             q[j, i] = effects[i, chosen[j]]
@@ -95,19 +96,19 @@ def _least_squares(effects: Any, wanted: Any, chosen: Any, count: int, solution:
 
 
 @guvectorize(["void(f8[:],f8[:,:],f8[:])"], "(m),(m,n)->(n)", cache=True)
-def _share(wanted: Any, effects: Any, shares: Any) -> None:
+def _share(desired: Any, effects: Any, shares: Any) -> None:
     m, n = effects.shape
     chosen = np.zeros(n, np.int64)  # the first `count` of them are free, all others zero
     count = 0
     trial = np.zeros(n)
     shares[:] = 0.0
-    tolerance = _SMALL * np.sqrt(np.sum(effects * effects) * np.sum(wanted * wanted))
+    tolerance = _SMALL * np.sqrt(np.sum(effects * effects) * np.sum(desired * desired))
     for _ in range(3 * n):
         best, steepest = -1, tolerance
         for j in range(n):
             slope, free = 0.0, False
             for i in range(m):
-                left = wanted[i]
+                left = desired[i]
                 for k in range(count):
                     left -= effects[i, chosen[k]] * shares[chosen[k]]
                 slope += effects[i, j] * left
@@ -120,8 +121,8 @@ def _share(wanted: Any, effects: Any, shares: Any) -> None:
         chosen[count] = best
         count += 1
         while count:
-            _least_squares(effects, wanted, chosen, count, trial)
-            # As far towards the least squares as no share falls below zero.
+            _least_squares(effects, desired, chosen, count, trial)
+            # Move towards the least-squares solution until a share reaches zero.
             way = 1.0
             for k in range(count):
                 j = chosen[k]

@@ -1,10 +1,10 @@
-"""On/off thrusters in the phase plane: each axis' angle a and rate a' say which way they fire.
+"""On/off thrusters in the phase plane: angle a and rate a' of each axis decide how they fire.
 
 R. Vázquez, "Tema 8: Control activo de la actitud", Universidad de Sevilla 2016 (paper 004), the
-reaction-control slides. On each axis a'' = u, and u is U, -U or zero: U follows from thrusters and
-inertia. The printed initial conditions want a' (erratum 16), and the coasting line is
-a - a_0 = t a'_0 (erratum 17). The axes are taken to be independent; several of them together are so
-to second order in the angle. All arrays may have leading vehicle axes; m is the number of axes.
+reaction-control slides. On each axis a'' = u with u = U, -U or zero, where U follows from thrusters
+and inertia. Corrected: the initial conditions need a' (erratum 16), and the coasting line is
+a - a_0 = t a'_0 (erratum 17). The axes are treated as independent, which holds to second order in
+the angles. All arrays may have leading vehicle axes; m is the number of axes.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from .relays import PhasePlane
 class Centre(PhasePlane):
     """u = -U sgn(a): a neutral centre of period 4 sqrt(2 a_0 / U), no limit cycle (erratum 8).
 
-    a'^2/2 + U |a| stays; a loop that is late by tau makes it grow by 2 U tau |a'| at each switch.
+    a'^2/2 + U |a| is constant; a delay tau in the loop adds 2 U tau |a'| to it at each switch.
     """
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
@@ -29,10 +29,10 @@ class Centre(PhasePlane):
 
 @dataclass(frozen=True, kw_only=True)
 class Sliding(PhasePlane):
-    """u = -U sgn(a + k a'): a few switches, and then it slides in as exp(-t/k) (erratum 9).
+    """u = -U sgn(a + k a'): after a few switches the state slides as exp(-t/k) (erratum 9).
 
-    It slides where |a'| <= k U, with as many switches as the loop is fast, and burns all the while;
-    behind a delay tau < k it ends in a limit cycle of a' = U tau (k - tau/2) / (k - tau).
+    Sliding occurs where |a'| <= k U. It switches at the rate of the loop and burns continuously.
+    With a delay tau < k it ends in a limit cycle of a' = U tau (k - tau/2) / (k - tau).
     """
 
     rate_gain: float = gain("s", default=1.0, at_least=0.0)
@@ -44,13 +44,14 @@ class Sliding(PhasePlane):
 
 @dataclass(frozen=True, kw_only=True)
 class MinimumTime(PhasePlane):
-    """u = -U sgn(a + a' |a'| / 2U): to rest with one switch, from rest in 2 sqrt(a_0 / U).
+    """u = -U sgn(a + a' |a'| / 2U): reaches rest with one switch, from rest in 2 sqrt(a_0 / U).
 
-    It is off where |a| is below ``dead_band`` and |a'| below what one integration step gives.
+    The thrusters are off where |a| is below ``dead_band`` and |a'| below the change of one
+    integration step.
     """
 
     dead_band: float = gain("rad", default=1e-3, at_least=0.0)
-    """A switch late by tau misses the target by twice tau times the peak rate; this takes it up."""
+    """Has to cover the error of a switch that is late by tau: twice tau times the peak rate."""
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
         ahead = angle + rate * np.abs(rate) / (2.0 * self.acceleration)
@@ -61,15 +62,16 @@ class MinimumTime(PhasePlane):
 
 @dataclass(frozen=True, kw_only=True)
 class MinimumFuel(PhasePlane):
-    """To rest at the target in a fixed time with the least fuel: burn, coast, burn.
+    """Reaches rest at the target in a fixed time with least fuel: burn, coast, burn.
 
-    The final time T is given, and no "minimum time" as printed (erratum 18). The burns are planned
-    once; of what begins within a step, the impulse is right and the instant is early.
-    Memory: the first burn [s], the second [s], its sense, the time elapsed [s].
+    The final time T is prescribed; the lecture calls it a minimum time (erratum 18). The burns are
+    planned once. A burn that begins within an integration step has the right impulse but starts
+    with the step. Memory: duration of the first burn [s] and of the second [s], the sense of the
+    second, the time elapsed [s].
     """
 
     final_time: float = gain("s", above=0.0)
-    """T: not below the minimum time."""
+    """T: at least the minimum time."""
 
     def _recall(self, angle: Array, rate: Array) -> Array:
         U, T = self.acceleration, self.final_time
@@ -81,7 +83,7 @@ class MinimumFuel(PhasePlane):
         second = first - v / U
         if (root < 0.0).any() or (first < -TICK).any() or (second < -TICK).any():
             raise ValueError(
-                f"final_time {T:g} s: no burn, coast and burn ends at rest in that time"
+                f"final_time: got {T:g} s, no burn, coast and burn ends at rest in that time"
             )
         return np.stack([first, second, sense, np.zeros_like(first)], axis=-1)
 
@@ -99,8 +101,8 @@ class MinimumFuel(PhasePlane):
 class Schmitt(PhasePlane):
     """A Schmitt trigger on s = a + k a': on where |s| > delta, off where |s| < delta - hysteresis.
 
-    It ends in a limit cycle with |a'| = hysteresis / 2k between the pulses, if slowly where k is
-    large. Memory: which way it fires.
+    It converges, slowly for large k, to a limit cycle with |a'| = hysteresis / 2k between pulses.
+    Memory: the firing sense, 1, 0 or -1.
     """
 
     threshold: float = gain("rad", above=0.0)
@@ -126,19 +128,19 @@ class Schmitt(PhasePlane):
 
 @dataclass(frozen=True, kw_only=True)
 class MinimumImpulse(PhasePlane):
-    """One pulse against each way out of the dead zone: the least that keeps it within.
+    """One pulse of fixed length at each exit from the dead zone: the least impulse to stay inside.
 
-    A pulse takes dv = U times its length. Without a disturbance the cycle has the period
-    8 delta / dv and two pulses, and is neutral: it keeps the rates that it began with. Under one of
-    d [rad/s^2] it is one-sided, a pulse every dv / d, and a ``rate_gain`` of dv / 2d brings it to
-    its least amplitude at once. Memory: what is left of the pulse [s], negative for one against
-    the axis.
+    A pulse changes the rate by dv = U times its length. Without a disturbance the limit cycle has
+    two pulses in a period of 8 delta / dv and is neutral: it keeps its initial rates. With a
+    constant disturbance d [rad/s^2] it is one-sided, with a pulse every dv / d; a ``rate_gain`` of
+    dv / 2d then gives the least amplitude at once. Memory: the remaining time of the pulse [s],
+    negative for one against the axis.
     """
 
     dead_zone: float = gain("rad", above=0.0)
     """delta."""
     pulse: float = gain("s", above=0.0)
-    """How long each lasts; no shorter than the valves can."""
+    """Length of a pulse; at least the minimum on-time of the valves."""
     rate_gain: float = gain("s", default=0.0, at_least=0.0)
     """k: a + k a' is held within the dead zone."""
 

@@ -1,10 +1,9 @@
-"""Attitude control with on/off thrusters on all axes: a torque, shared out, in pulses.
+"""Attitude control with on/off thrusters on all axes: a PD torque, allocated, in pulses.
 
-A PD torque on the quaternion's vector part, with the reference's own torque fed forward, is shared
-out to thrusters by non-negative least squares, and their shares to pulses with what is left over
-carried to the next control period. With an ``attitude_gain`` of zero it only takes the rate away.
-Vázquez 2016 (paper 004) has the torque; sharing and pulses are in ``allocation``. All arrays may
-have leading vehicle axes.
+A PD torque on the quaternion's vector part, plus the torque of the reference motion, is allocated
+to thrusters by non-negative least squares and fired in pulses, whose remainders are carried over to
+the next control period. With an ``attitude_gain`` of zero it damps the rate alone. The torque is
+from Vázquez 2016 (paper 004), the rest is ``allocation``. All arrays may have leading vehicle axes.
 """
 
 from dataclasses import dataclass
@@ -21,23 +20,23 @@ from .allocation import effect, pulses, share, within
 
 
 class State(NamedTuple):
-    """What the law remembers."""
+    """Memory of the law."""
 
     carry: Array
-    """On-time that is still to be fired by each thruster [s], (..., n)."""
+    """On-time of each thruster that is carried over [s], (..., n)."""
 
 
 class Signals(NamedTuple):
-    """What the law shows."""
+    """Signals of the law."""
 
     angle: Annotated[Array, Unit("rad")]
-    """Rotation vector from where the body should be [rad], body axes, (..., 3)."""
+    """Rotation vector from the desired to the measured attitude [rad], body axes, (..., 3)."""
     angle_rate: Annotated[Array, Unit("rad/s")]
-    """Rate less the wanted rate [rad/s], body axes, (..., 3)."""
+    """Measured less desired rate [rad/s], body axes, (..., 3)."""
     torque: Array
-    """That is asked for [N m], body axes, (..., 3)."""
+    """Commanded torque [N m], body axes, (..., 3)."""
     shares: Array
-    """Of the period that each thruster should be on, (..., n)."""
+    """Fraction of the period that each thruster should be on, (..., n)."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class PulsedPd(Gains):
     batched: ClassVar[bool] = True
 
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
-    """H: of the vehicle, body axes."""
+    """H: of the whole vehicle, about its centre of mass, body axes."""
     thruster_positions: Array = gain("m", ("thruster", 3))
     """From the centre of mass, body axes, (n, 3)."""
     thruster_directions: Array = gain(shape=("thruster", 3), form="unit vector")
@@ -56,27 +55,27 @@ class PulsedPd(Gains):
     """Of each, (n,)."""
     control_period: float = gain("s", above=0.0)
     attitude_gain: float = gain("N m", at_least=0.0)
-    """kp: half of it is the stiffness against small angles."""
+    """kp: the stiffness for small angles is half of it."""
     rate_gain: float = gain("N m s/rad", at_least=0.0)
     """kd, the same on each axis."""
     thruster_minimum_on: float = gain("s", default=0.0, at_least=0.0)
-    """What is less is not fired but carried over."""
+    """Shorter pulses are not fired but carried over."""
     force_weight: float = gain("m", default=1.0, at_least=0.0)
-    """Of a push that nobody asked for, against a wrong torque; zero lets it push."""
+    """Weight of an unwanted net force relative to a torque error; zero ignores the force."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
-        """Return that nothing is carried over."""
+        """Return the initial state: nothing is carried over."""
         none = np.zeros((*measurement.rate.shape[:-1], len(self.thruster_force)))
         return State(none)
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, PulseCommand, Signals]:
-        """Return the on-times of this period, and what is behind them."""
+        """Return the next state, the on-times of this period, and the signals."""
         angle, slip = turn(measurement, reference, np.eye(3))
         torque = self._torque(angle, slip, measurement.rate, reference)
-        wanted = np.concatenate([torque, np.zeros_like(torque)], axis=-1)
-        shares, _ = within(share(wanted, self._effects))
+        desired = np.concatenate([torque, np.zeros_like(torque)], axis=-1)
+        shares, _ = within(share(desired, self._effects))
         on_time, carry = pulses(shares, state.carry, self.control_period, self.thruster_minimum_on)
         return State(carry), PulseCommand(on_time), Signals(angle, slip, torque, shares)
 
@@ -84,7 +83,7 @@ class PulsedPd(Gains):
         half = 0.5 * np.linalg.norm(angle, axis=-1, keepdims=True)
         vector = 0.5 * np.sinc(half / np.pi) * angle
         to_body = att.from_rotation_vector(-angle)
-        # The wanted acceleration, as the body's axes see it turn past.
+        # The derivative of the desired rate's components in the rotating body axes.
         acceleration = att.rotate(to_body, reference.acceleration) - np.cross(rate, rate - slip)
         torque: Array = (
             -self.attitude_gain * vector

@@ -1,8 +1,8 @@
-"""Relays that fire on/off thrusters for each axis: what the laws of the phase plane share.
+"""Relays that fire on/off thrusters for each axis: the base of the phase-plane laws.
 
-A relay is electronics and no program: it is evaluated in every integration step, in ``inner``, and
-switches half of one late on average, whatever the control period is. All
-arrays may have leading vehicle axes; m is the number of axes.
+A relay is electronics, not software: it is evaluated in every integration step, in ``inner``, and
+switches half a step late on average, independently of the control period. All arrays may have
+leading vehicle axes; m is the number of axes.
 """
 
 from abc import ABC, abstractmethod
@@ -20,14 +20,14 @@ from .allocation import effect, pattern
 
 
 class State(NamedTuple):
-    """What a law remembers."""
+    """Memory of a law."""
 
     memory: Array
-    """Of each axis, (..., m, k): its own docstring says what."""
+    """Memory of each axis, (..., m, k); the law's docstring defines its k columns."""
 
 
 class Aim(NamedTuple):
-    """What the relays are told at a control instant, and what they command then."""
+    """Command of a control instant: the desired motion for the relays, and their first on-times."""
 
     attitude: Array
     """Of the desired axes, as a quaternion to inertial axes, (..., 4)."""
@@ -40,26 +40,26 @@ class Aim(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """What a law shows."""
+    """Signals of a law."""
 
     angle: Annotated[Array, Unit("rad")]
-    """a: of the body from where it should be, about each axis [rad], (..., m)."""
+    """a: angle from the desired to the measured attitude about each axis [rad], (..., m)."""
     angle_rate: Annotated[Array, Unit("rad/s")]
     """a' [rad/s], (..., m)."""
     firing: Array
-    """1.0 or -1.0 while thrusters turn it that way about an axis, else 0.0, (..., m)."""
+    """Sense of the thrusters' torque about each axis: 1.0, -1.0, or 0.0 when off, (..., m)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhasePlane(Gains, ABC):
-    """What these laws have in common: thrusters for both senses of each axis."""
+    """Base of the phase-plane laws: thrusters for both senses of each axis."""
 
     batched: ClassVar[bool] = True
 
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
-    """Of the vehicle, body axes."""
+    """Of the whole vehicle, about its centre of mass, body axes."""
     axes: Array = gain(shape=(None, 3), default=np.eye(3), form="unit vector")
-    """Those that are controlled, unit vectors in body axes, (m, 3)."""
+    """Controlled axes, unit vectors in body axes, (m, 3)."""
     thruster_positions: Array = gain("m", ("thruster", 3))
     """From the centre of mass, body axes, (n, 3)."""
     thruster_directions: Array = gain(shape=("thruster", 3), form="unit vector")
@@ -68,14 +68,16 @@ class PhasePlane(Gains, ABC):
     """Of each, (n,)."""
     control_period: float = gain("s", above=0.0)
     inner_period: float = gain("s", above=0.0)
-    """For which a relay's state is held: the integration step."""
+    """Time for which a relay's state is held: the integration step."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         torques = self._effects[:3] @ self._patterns.swapaxes(1, 2)
         one, other = np.einsum("mi,sim->sm", self.axes, torques)
         if not np.allclose(one, -other, rtol=1e-9):
-            raise ValueError(f"the thrusters turn it by {one} N m one way, {-other} N m the other")
+            raise ValueError(
+                f"the thrusters' torques about the axes differ by sense: {one} N m and {other} N m"
+            )
 
     @cached_property
     def acceleration(self) -> Array:
@@ -91,18 +93,18 @@ class PhasePlane(Gains, ABC):
 
     @cached_property
     def _patterns(self) -> Array:
-        """The thrusters' shares for a turn about each axis, and against it, (2, m, n)."""
+        """The thrusters' shares for a torque along each axis, and against it, (2, m, n)."""
         ways = ([pattern(way * axis, self._effects) for axis in self.axes] for way in (1.0, -1.0))
         return np.array(list(ways))
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
-        """Return what is remembered at first."""
+        """Return the initial memory."""
         return State(self._recall(*turn(measurement, reference, self.axes)))
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, Aim, Signals]:
-        """Return what the relays aim at, and which way each axis is turned at this instant."""
+        """Return the desired motion for the relays, and the signals of this instant."""
         angle, rate = turn(measurement, reference, self.axes)
         _, firing, duration = self._decide(state.memory, angle, rate)
         still = np.zeros_like(measurement.rate)
@@ -117,7 +119,7 @@ class PhasePlane(Gains, ABC):
     def inner(
         self, state: State, time: float, command: Aim, measurement: Measurement
     ) -> tuple[State, PulseCommand]:
-        """Return for how long each thruster is on in the integration step that begins."""
+        """Return each thruster's on-time in the integration step that begins."""
         desired = Reference(command.attitude, command.rate, command.acceleration)
         if command.rate.any() or command.acceleration.any():
             since = time - self.control_period * np.floor(time / self.control_period + 1e-9)
@@ -137,13 +139,13 @@ class PhasePlane(Gains, ABC):
         return on_time
 
     def _recall(self, angle: Array, rate: Array) -> Array:
-        """Return the first memory, (..., m, k)."""
+        """Return the initial memory, (..., m, k)."""
         return np.zeros((*angle.shape, 1))
 
     @abstractmethod
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
-        """Return (memory, which way to fire: 1, 0 or -1, for how long [s]), the latter (..., m)."""
+        """Return (memory (..., m, k), firing sense 1, 0 or -1 (..., m), on-time [s] (..., m))."""
 
     def _whole(self, firing: Array) -> tuple[Array, Array, Array]:
-        """Return a decision that holds for the whole integration step; it is remembered."""
+        """Return the decision to fire for the whole integration step, with the sense as memory."""
         return firing[..., None], firing, np.full_like(firing, self.inner_period)

@@ -1,4 +1,4 @@
-"""Wheels that point, unloaded by thrusters meanwhile."""
+"""Unloading of reaction wheels by thrusters while the wheels control the attitude."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
@@ -11,35 +11,35 @@ from ..attitude.linear_quadratic import Regulator, Signals
 
 
 class Command(NamedTuple):
-    """What wheels and thrusters are asked for."""
+    """Command to wheels and thrusters."""
 
     torque: Annotated[Array, Unit("N m")]
-    """Of the wheels on the bus, body axes [N m], (..., 3)."""
+    """Torque of the wheels on the bus, body axes [N m], (..., 3)."""
     thruster_torque: Annotated[Array, Unit("N m")]
-    """On the bus, body axes [N m], (..., 3)."""
+    """Torque of the thrusters on the bus, body axes [N m], (..., 3)."""
 
 
 @dataclass(frozen=True)
 class ThrusterUnloading(Regulator):
-    """Thrusters give M = -kd h, and the wheels are told of it: h = h0 exp(-kd t), pointing as ever.
+    """Thrusters give M = -kd h, which is fed forward to the wheels: h = h0 exp(-kd t).
 
-    R. Vazquez, Control activo de la actitud, Univ. Sevilla 2016. If the wheels are not told, the
-    attitude is off by M/ka. M is held for a period T, for which (1 - exp(-kd T))/T is in kd's
-    place: h is then that of the closed form at every period's end.
+    R. Vazquez, Control activo de la actitud, Univ. Sevilla 2016. The feedforward keeps the attitude
+    undisturbed; without it the attitude error is M/ka. M is held for a period T, so that kd is
+    replaced by (1 - exp(-kd T))/T: then h equals the closed form at the end of every period.
     """
 
     unloading_gain: float = gain("1/s", default=0.005, at_least=0.0)
     """kd."""
     control_period: float = gain("s", default=0.1, above=0.0)
-    """T; the scenario's, when left out."""
+    """T; default: the scenario's."""
     feed_forward: float = gain(default=1.0, at_least=0.0, at_most=1.0)
-    """Part of the thrusters' torque that the wheels are told of: 1 or, to see the error, 0."""
+    """Share of the thrusters' torque that is fed forward to the wheels; 0 shows the error M/ka."""
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[Any, Any, Signals]:
-        """Return the torques of wheels and thrusters."""
-        state, wheels, shown = super().step(state, time, measurement, reference)
+        """Return the regulator's state and signals, and the torques of wheels and thrusters."""
+        state, wheels, signals = super().step(state, time, measurement, reference)
         decay = -np.expm1(-self.unloading_gain * self.control_period) / self.control_period
-        brought = -decay * shown.h
-        return state, Command(wheels.torque - self.feed_forward * brought, brought), shown
+        thrusters = -decay * signals.h
+        return state, Command(wheels.torque - self.feed_forward * thrusters, thrusters), signals

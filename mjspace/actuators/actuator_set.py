@@ -1,17 +1,19 @@
 """Actuators of several kinds side by side, each of which obeys its own fields of the command."""
 
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from mjspace.actuators.base import Actuator, Input, State
 from mjspace.contract import Array, Measurement
 from mjspace.errors import FlightError
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class ActuatorSet:
 
         They are those in the middle of the integration step from ``before`` to ``after``.
         """
-        burning = [kind.masses(before, after) for kind in self.kinds]
+        burning = [_of(kind, kind.masses, before, after) for kind in self.kinds]
         return [(name, *change) for masses in burning for name, change in masses.items()]
 
     def inputs(self, batch: Any) -> list[Array]:
@@ -66,7 +68,8 @@ class ActuatorSet:
 
     def reset(self, vehicles: int) -> State:
         """Return the state of all at the start."""
-        return {name: a for kind in self.kinds for name, a in kind.reset(vehicles).items()}
+        states = [_of(kind, kind.reset, vehicles) for kind in self.kinds]
+        return {name: array for state in states for name, array in state.items()}
 
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
@@ -80,10 +83,7 @@ class ActuatorSet:
         applied, saturated = [], []
         for kind in self.kinds:
             _check(command, kind, len(truth.rate))
-            try:
-                after, output, cut = kind.act(state, command, truth, step)
-            except Exception as error:
-                raise _failure(kind, error) from error
+            after, output, cut = _of(kind, kind.act, state, command, truth, step)
             if output.shape != (len(truth.rate), kind.drives.width):
                 raise FlightError(
                     f"the actuator {type(kind).__name__} applies an array of shape {output.shape}: "
@@ -97,7 +97,7 @@ class ActuatorSet:
     def seen(self, state: State, truth: Measurement) -> Measurement:
         """Return the truth with what the actuators' own sensors measure."""
         for kind in self.kinds:
-            truth = kind.measured(state, truth)
+            truth = _of(kind, kind.measured, state, truth)
         return truth
 
     def logged(self, applied: Sequence[tuple[Array, ...]]) -> dict[str, Array]:
@@ -135,14 +135,20 @@ def _described(driven: Input) -> str:
     return f"{driven.array}[{driven.columns.start}:{driven.columns.stop}]"
 
 
-def _failure(kind: Actuator, error: Exception) -> FlightError:
-    """Return the error that says which actuator raised what, and in which line."""
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    place = f"{Path(frame.filename).name}:{frame.lineno}"
-    return FlightError(
-        f"the actuator {type(kind).__name__} ({kind.logged_as}) raised {type(error).__name__} at "
-        f"{place}: {error}"
-    )
+def _of(kind: Actuator, method: Callable[..., Result], *arguments: Any) -> Result:
+    """Return what the ``method`` of ``kind`` returns.
+
+    Raises:
+        FlightError: it raised; with the actuator, what it raised and in which line.
+    """
+    try:
+        return method(*arguments)
+    except Exception as error:
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        raise FlightError(
+            f"the actuator {type(kind).__name__} ({kind.logged_as}) raised {type(error).__name__} "
+            f"at {Path(frame.filename).name}:{frame.lineno}: {error}"
+        ) from error
 
 
 def _check(command: Any, kind: Actuator, vehicles: int) -> None:

@@ -1,27 +1,74 @@
-"""Faults of actuators: what they give is changed on its way to the vehicle, from a moment on."""
+"""Faults of actuators: what they apply is changed on its way to the vehicle, from a moment on."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import Field, field_validator, model_validator
 
 from mjspace.actuators.base import Actuator, State
+from mjspace.actuators.fault_kinds import KINDS
 from mjspace.contract import TICK, Array, Event
 from mjspace.errors import input_error_at, nearest
-from mjspace.scenario.faults import Fault
+from mjspace.scenario.fields import Finite, Seconds, Table, Time
+from mjspace.scenario.region import Region
 from mjspace.sensors.noise import normals
 from mjspace.signals import find_signal, magnitude
-from mjspace.units import whole_number
+from mjspace.units import any_to_si
 
 STREAM = 1000
 """First number of the faults' random streams; the sensors' are the fields of ``Measurement``."""
 _WAITING, _IN_FORCE, _OVER = 0.0, 1.0, 2.0
+_WITH_VALUE = [name for name, kind in KINDS.items() if kind.has_value]
+
+
+class Fault(Table):
+    """From a moment on a motor does not apply what its model says; the log mentions when."""
+
+    motor: str
+    """Its name, ``wheel_0`` or ``thruster_3``; or all of a kind, or one of them, as /command has
+    them: ``thruster_thrust``, ``thruster_thrust[3]``, ``magnetic_moment[2]``."""
+    kind: Literal[*KINDS] = Field(  # type: ignore[valid-type]
+        description="It applies: "
+        + "; ".join(f"{name}, {kind.applies}" for name, kind in KINDS.items())
+        + "."
+    )
+    value: Finite | None = Field(
+        default=None, description=f"Of {', '.join(_WITH_VALUE)}; a number in SI or a quantity."
+    )
+    at: Time | None = None
+    """When it begins: at the first integration step that is not before."""
+    when: Region | None = None
+    """Or the first control period in which a signal is inside: one of ``truth`` as ideal sensors
+    measure it, ``measurement``, ``command`` or ``law``."""
+    until: Seconds | None = None
+    """When it is over; never when left out."""
+
+    @field_validator("value", mode="before")
+    @classmethod
+    def _quantity(cls, value: Any) -> Any:
+        return any_to_si(value) if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Fault":
+        kind = KINDS[self.kind]
+        if (self.value is not None) != kind.has_value:
+            has = "one: give it" if kind.has_value else "none"
+            raise ValueError(f"value: a motor that is {self.kind} has {has}")
+        if (self.at is None) == (self.when is None):
+            raise ValueError("at and when: give one of them")
+        if self.at is not None and self.until is not None and self.until <= self.at:
+            raise ValueError(f"until {self.until:g} s is not after at {self.at:g} s")
+        if kind.is_positive and not (self.value or 0.0) > 0.0:
+            raise ValueError(f"value {self.value:g} of one that is {self.kind}: more than 0")
+        return self
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a fault's motors are in what the kinds of actuators give."""
+    """Where a fault's motors are in what the kinds of actuators apply."""
 
     kind: int
     columns: list[int]
@@ -36,8 +83,8 @@ def between(tables: Sequence[Fault], control: float) -> bool:
 class FaultSet:
     """The faults of a batch of vehicles; all memory is in ``State``.
 
-    A fault begins and ends with an integration step; one that looks at a signal begins with a
-    control period. Of several on one motor, each changes what those listed before have left.
+    A fault begins and ends with an integration step; one that depends on a signal begins with a
+    control period. Of several on one motor, each changes what those listed before it apply.
     """
 
     def __init__(
@@ -48,7 +95,7 @@ class FaultSet:
         seed: int,
         members: Sequence[int],
     ) -> None:
-        """Find the motors; ``hold`` [s] is how long what actuators give is held.
+        """Find the motors; ``hold`` [s] is how long what actuators apply is held.
 
         Raises:
             ValueError: no such motor, or a delay that is no whole number of holds.
@@ -64,12 +111,9 @@ class FaultSet:
                     f"faults.{number}.motor: none is called {fault.motor!r}"
                     f"{nearest(fault.motor, known)}"
                 )
-            place, length = known[fault.motor], int(fault.kind == "stuck")
-            if fault.kind == "delayed" and fault.value:
-                key = f"faults.{number}.value"
-                length = whole_number(fault.value, hold, key, "what is held by actuators")
+            place, key = known[fault.motor], f"faults.{number}.value"
             self._places.append(place)
-            self._lengths.append(length)
+            self._lengths.append(KINDS[fault.kind].memory(fault.value or 0.0, hold, key))
             width = len(place.columns)
             self._noises.append(normals(seed, members, (STREAM + number,), width))
 
@@ -77,8 +121,8 @@ class FaultSet:
         """Return the state at the start.
 
         Its fields: "fault_phase" (N, faults), 0 before each, 1 while it lasts and 2 after it; and
-        "fault_<number>_past" (N, motors, k), what the motors of a delayed or stuck one would have
-        given, the newest last.
+        "fault_<number>_past" (N, motors, k), what the motors of a delayed or stuck one should have
+        applied, the newest last.
         """
         state = {"fault_phase": np.full((self._vehicles, len(self._tables)), _WAITING)}
         for number, length in enumerate(self._lengths):
@@ -88,15 +132,15 @@ class FaultSet:
         return state
 
     def decide(
-        self, state: State, now: float, seen: Mapping[str, Any] | None
+        self, state: State, now: float, measured: Mapping[str, Any] | None
     ) -> tuple[State, list[Event]]:
         """Return the state with what begins and ends at ``now`` [s], and the events of that.
 
-        ``seen`` has the named tuples that a fault's ``when`` may look at, by topic; None between
-        control instants, where none looks.
+        ``measured`` has the named tuples that a fault's ``when`` may depend on, by topic; None
+        between control instants, where none begins by a signal.
 
         Raises:
-            InputError: a fault looks at a signal that is not there, with the near names.
+            InputError: a fault depends on an unknown signal, with the near names.
         """
         phase = state["fault_phase"].copy()
         happened = []
@@ -104,7 +148,7 @@ class FaultSet:
             over = fault.until is not None and now >= fault.until - TICK
             ends = over & (phase[:, number] == _IN_FORCE)
             begins = ~np.bool_(over) & (phase[:, number] == _WAITING)
-            begins &= self._is_due(number, now, seen)
+            begins &= self._is_due(number, now, measured)
             phase[ends, number], phase[begins, number] = _OVER, _IN_FORCE
             what = f"fault: {fault.motor} is {fault.kind}"
             happened += [Event(now, int(v), "WARNING", what) for v in np.flatnonzero(begins)]
@@ -114,48 +158,45 @@ class FaultSet:
         return state | {"fault_phase": phase}, happened
 
     def change(
-        self, state: State, given: tuple[Array, ...], now: float
+        self, state: State, applied: tuple[Array, ...], now: float
     ) -> tuple[State, tuple[Array, ...]]:
-        """Return (state, what the motors give instead of ``given``) from ``now`` [s] on."""
-        state, result = state.copy(), list(given)
+        """Return (state, what the motors apply instead of ``applied``) from ``now`` [s] on."""
+        state, result = state.copy(), list(applied)
         for number, place in enumerate(self._places):
-            right = result[place.kind][:, place.columns]
+            kind, right = KINDS[self._tables[number].kind], result[place.kind][:, place.columns]
             field = f"fault_{number}_past"
             past = state.get(field)
-            index = round(now / self._hold)
-            wrong = self._wrong(number, right, past, index)
+            wrong = self._faulty(number, right, past, round(now / self._hold))
             in_force = state["fault_phase"][:, number] == _IN_FORCE
             if past is not None:
                 newest = np.concatenate([past[..., 1:], right[..., None]], axis=-1)
-                keeps = in_force & (self._tables[number].kind == "stuck")
+                keeps = in_force & kind.remembers_begin
                 state[field] = np.where(keeps[:, None, None], past, newest)
             changed = result[place.kind].copy()
             changed[:, place.columns] = np.where(in_force[:, None], wrong, right)
             result[place.kind] = changed
-        for number, kind in enumerate(self._kinds):
-            state, result[number] = kind.account_propellant(
-                state, given[number], result[number], self._hold
+        for number, actuator in enumerate(self._kinds):
+            state, result[number] = actuator.account_propellant(
+                state, applied[number], result[number], self._hold
             )
         return state, tuple(result)
 
-    def _wrong(self, number: int, right: Array, past: Array | None, index: int) -> Array:
-        """Return what the fault's motors give where it is in force, (N, motors)."""
-        kind, value = self._tables[number].kind, self._tables[number].value or 0.0
-        if past is not None:
-            return past[..., 0]
-        if kind == "noisy":
-            return right + value * self._noises[number](index)
-        return right + value if kind == "biased" else right * value  # of a dead one by zero
+    def _faulty(self, number: int, right: Array, past: Array | None, index: int) -> Array:
+        """Return what the fault's motors apply where it is in force, (N, motors)."""
+        fault = self._tables[number]
+        oldest = np.zeros(0) if past is None else past[..., 0]
+        noise = partial(self._noises[number], index)
+        return KINDS[fault.kind].faulty(right, fault.value or 0.0, oldest, noise)
 
-    def _is_due(self, number: int, now: float, seen: Mapping[str, Any] | None) -> Any:
+    def _is_due(self, number: int, now: float, measured: Mapping[str, Any] | None) -> Any:
         fault = self._tables[number]
         if fault.at is not None:
             return now >= fault.at - TICK
-        if fault.when is None or seen is None:
+        if fault.when is None or measured is None:
             return np.bool_(False)
         arrays = {
             f"/{topic}": {n: np.asarray(a) for n, a in values._asdict().items() if np.size(a)}
-            for topic, values in seen.items()
+            for topic, values in measured.items()
             if values
         }
         topics = {t: {n: a.shape[1:] for n, a in fields.items()} for t, fields in arrays.items()}

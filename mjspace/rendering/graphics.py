@@ -1,6 +1,6 @@
-"""Whether the OpenGL that the environment variable MUJOCO_GL names is there.
+"""Checks that the OpenGL library named by the environment variable MUJOCO_GL is installed.
 
-MuJoCo reads it when it is imported and fails with a traceback, whatever is to be done.
+MuJoCo reads the variable when it is imported, and fails with a traceback for any command.
 """
 
 import os
@@ -12,7 +12,7 @@ from mjspace.errors import NoRendererError
 _ON = ("", "enable", "enabled", "on", "true", "1", "glfw")
 _OFF = ("disable", "disabled", "off", "false", "0")
 _OF_PLATFORM = {"linux": ("egl", "osmesa", "glx"), "win32": ("wgl",), "darwin": ("cgl",)}
-_NEEDS = {  # library, and the package of Debian and Ubuntu that has it
+_NEEDS = {  # library, and the package of Debian and Ubuntu that provides it
     "egl": ("EGL", "libegl1 libgl1"),
     "osmesa": ("OSMesa", "libosmesa6"),
 }
@@ -27,8 +27,8 @@ def check() -> None:
     """Check MUJOCO_GL.
 
     Raises:
-        NoRendererError: it has a value that MuJoCo does not know, or names a library that is not
-            installed; with the values that there are, or what to install.
+        NoRendererError: MuJoCo does not know the value, or the library is not installed. The
+            message lists the known values, or what to install.
     """
     value = chosen()
     known = (*_OF_PLATFORM.get(sys.platform, ()), *_ON[1:], *_OFF)

@@ -26,7 +26,7 @@ class Canvas:
         """Prepare to draw scenes of ``model`` as images of ``size`` (width, height).
 
         Raises:
-            NoRendererError: no OpenGL context can be had, with what to install.
+            NoRendererError: no OpenGL context can be created; the message says what to install.
         """
         graphics.check()
         if graphics.is_off():
@@ -47,7 +47,7 @@ class Canvas:
         self._pixels = np.empty((height, width, 3), np.uint8)
 
     def draw(self, scene: Any) -> Frame:
-        """Return the image of an ``mujoco.MjvScene``."""
+        """Return the image of a ``mujoco.MjvScene``."""
         mujoco.mjr_render(self._rectangle, scene, self._renderer)
         mujoco.mjr_readPixels(self._pixels, None, self._rectangle, self._renderer)
         return self._pixels[::-1].copy()  # OpenGL's first row is the lowest
@@ -66,7 +66,7 @@ class Canvas:
 
 
 def _context_type() -> Any:
-    """Return the class of OpenGL contexts. MuJoCo's own choice is made when it is imported."""
+    """Return the class of OpenGL contexts: EGL's on Linux, unless MUJOCO_GL is set."""
     if sys.platform == "linux" and not os.environ.get("MUJOCO_GL"):
         from mujoco.egl import GLContext
     else:

@@ -1,4 +1,4 @@
-"""What is written on a frame: whose flight it is, when, and how well it points."""
+"""The caption of a frame: scenario and law, time, and the flight's error."""
 
 from functools import cache
 from pathlib import Path
@@ -16,7 +16,7 @@ WHITE, GREY, SHADE = (255, 255, 255, 255), (200, 208, 220, 255), (0, 0, 0, 96)
 def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> Frame:
     """Return the frame with two lines of text in each lower corner, the upper ones larger.
 
-    Sizes follow the frame's height, down to what can still be read.
+    Font sizes scale with the frame's height, down to the smallest that is legible.
     """
     height, width = frame.shape[:2]
     image = Image.fromarray(frame)
@@ -31,18 +31,18 @@ def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> Frame:
 
 
 def angle_text(angle: float) -> str:
-    """Return an angle [rad] in degrees, to two decimals or, below those, two digits."""
+    """Return an angle [rad] in degrees: two decimals, or two digits below 0.01 deg."""
     degrees = float(np.degrees(angle))
     return f"{degrees:.2f} deg" if degrees >= 0.01 else f"{degrees:.2g} deg"
 
 
 def path_text(position: Array, velocity: Array, error: Array) -> str:
-    """Return height [m], speed [m/s] and distance from the wanted path [m], of vectors (3,)."""
+    """Return height [m], speed [m/s] and distance from the desired path [m], of vectors (3,)."""
     speed, off = float(np.linalg.norm(velocity)), float(np.linalg.norm(error))
     return f"height {position[2]:.1f} m, speed {speed:.2f} m/s, {off:.2f} m off its path"
 
 
 @cache
 def _font(name: str, size: int) -> ImageFont.FreeTypeFont:
-    # matplotlib carries the only font that is on every machine.
+    # The font comes with matplotlib, so that it exists on every machine.
     return ImageFont.truetype(Path(matplotlib.get_data_path(), "fonts/ttf", f"{name}.ttf"), size)

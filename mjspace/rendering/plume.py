@@ -1,4 +1,4 @@
-"""The plume of a gimballed engine: as long and as bright as the thrust, gone without it."""
+"""The plume of a gimballed engine: length and brightness follow the thrust."""
 
 from typing import Any
 
@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 
 PLUME = 4
-"""The geom group of a plume's ellipsoids: drawn as of full thrust, their third axis along it.
+"""The geom group of a plume's ellipsoids, whose third axis is along the plume.
 
-Lights on the body that carries them belong to it.
+The model has their size at full thrust. Lights on the same body belong to the plume.
 """
 
 
 class Plume:
-    """What is in geom group ``PLUME`` of a model; of one without it nothing."""
+    """The geoms and lights of a model's plume; of a model without plume none."""
 
     def __init__(self, model: Any) -> None:
         self._model = model
@@ -28,7 +28,7 @@ class Plume:
     def burn(self, share: float, option: Any) -> None:
         """Set the model and a ``mujoco.MjvOption`` to this share of full thrust, 0 to 1.
 
-        The root stays in the throat.
+        The root of the plume stays in the throat of the nozzle.
         """
         model, geoms = self._model, self._geoms
         option.geomgroup[PLUME] = share > 0.0
@@ -39,7 +39,7 @@ class Plume:
         model.mat_rgba[self._materials, 3] = np.sqrt(share) * self._opacity
 
     def lift_shadow(self, scene: Any) -> None:
-        """Make the plume in a ``mujoco.MjvScene`` a decoration, which throws no shadow."""
+        """Make the plume in a ``mujoco.MjvScene`` a decoration, which casts no shadow."""
         geoms = set(self._geoms.tolist())
         for geom in scene.geoms[: scene.ngeom] if geoms else ():
             if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid in geoms:

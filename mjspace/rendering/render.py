@@ -1,4 +1,4 @@
-"""A log as a video or a picture: the model that is in it, drawn as it was at each frame's time."""
+"""Renders a log as a video or a picture: its model in the logged states."""
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import repeat
@@ -31,14 +31,15 @@ def render(
 ) -> None:
     """Draw a log: a video where ``output`` ends in .mp4, a still where it ends in .png.
 
-    A video has ``rate`` frames a second, ``speed`` simulated seconds for each of its own, and both
-    the log's first instant and (to within a frame) its last. A still is of ``at`` [s], the end when
-    left out. ``size`` is (width, height) in pixels; ``progress`` is told the time drawn [s].
+    A video has ``rate`` frames per second and shows ``speed`` simulated seconds per second, from
+    the first instant of the log to the last (to within a frame). A still shows the time ``at`` [s],
+    by default the end. ``size`` is (width, height) in pixels; ``progress`` is called with the time
+    of each frame [s].
 
     Raises:
-        ValueError: another ending, no such camera, an odd size of a video, a rate or speed that is
-            not positive, a time that was not logged, or no log of mjspace.
-        NoRendererError: this machine cannot draw, with what to install.
+        ValueError: an unknown file ending or camera, an odd size of a video, a rate or speed that
+            is not positive, a time that was not logged, or a file that is not a log of mjspace.
+        NoRendererError: this machine cannot render; the message says what to install.
         OSError: a file cannot be read or written.
     """
     log, output = Log.of(log), Path(output)
@@ -47,7 +48,7 @@ def render(
     if min(size) < 16 or min(rate, speed) <= 0.0:
         raise ValueError(
             f"size {size[0]}x{size[1]}, rate {rate:g}, speed {speed:g}: "
-            "a size is at least 16x16, a rate and a speed are positive"
+            "a size should be at least 16x16, a rate and a speed positive"
         )
     if output.suffix == ".png":
         times: Array = np.array([_still_time(log, at)])
@@ -64,12 +65,12 @@ def render(
 
 
 def nearest_rows(log: Log, topic: str, field: str, times: Array) -> Iterator[Array]:
-    """Yield the field's value logged nearest to each of the ascending ``times`` [s], shape (n,).
+    """Yield the field's value logged nearest to each of the ascending ``times`` (n,) [s].
 
-    The log is read once, with one chunk of it in memory.
+    The log is read once, with one block of it in memory.
 
     Raises:
-        ValueError: the log has no such topic or field, or nothing near the times.
+        ValueError: the log does not have the topic or field, or no row near the times.
     """
     margin = float(log.metadata["control_period"])
     stamps, rows, done = np.empty(0), np.empty((0, *log.topics[topic][field])), 0
@@ -83,7 +84,7 @@ def nearest_rows(log: Log, topic: str, field: str, times: Array) -> Iterator[Arr
             yield rows[np.abs(stamps - time).argmin()]
         done = due
     if not len(stamps):
-        raise ValueError(f"{log.path} holds nothing on {topic} near {times[0]:g} s")
+        raise ValueError(f"{log.path} has no {topic} near {times[0]:g} s")
     for _ in times[done:]:
         yield rows[-1]
 
@@ -104,7 +105,7 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
     if "on_time" in log.topics.get("/command", {}):
         pulses = nearest_rows(log, "/command", "on_time", times)
     with Canvas(stage.model, size) as canvas:
-        for time, physics, wanted, on_time, burning, how_well in zip(
+        for time, physics, desired, on_time, thrust, caption in zip(
             times,
             nearest_rows(log, "/state", "physics", times),
             nearest_rows(log, "/reference", "attitude", times),
@@ -113,12 +114,12 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
             captions(log, times),
             strict=True,
         ):
-            stage.set(float(time), physics, wanted, on_time, burning)
-            yield overlay.write(canvas.draw(stage.scene), left, (f"{time:.2f} s", how_well))
+            stage.set(float(time), physics, desired, on_time, thrust)
+            yield overlay.write(canvas.draw(stage.scene), left, (f"{time:.2f} s", caption))
 
 
 def shares_of_thrust(log: Log, engine: Any, times: Array) -> Iterator[float]:
-    """Yield the share of the largest thrust of ``engine``, its table: 0 where that is None."""
+    """Yield the thrust at each time over the engine's largest: 0 for a vehicle without engine."""
     if engine is None:
         yield from repeat(0.0, len(times))
     else:
@@ -127,7 +128,7 @@ def shares_of_thrust(log: Log, engine: Any, times: Array) -> Iterator[float]:
 
 
 def captions(log: Log, times: Array) -> Iterator[str]:
-    """Yield what the caption says of the flight: its path where it has one, else its attitude."""
+    """Yield the caption's text at each time: path and its error, or else the attitude error."""
 
     def truth(field: str) -> Iterator[Array]:
         return nearest_rows(log, "/truth", field, times)

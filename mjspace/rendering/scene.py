@@ -1,4 +1,4 @@
-"""The scene of one logged instant: the model's bodies, the planet, the axes and the wanted ones."""
+"""The scene of one logged instant: bodies, planet, body axes and desired axes."""
 
 from typing import Any
 
@@ -13,25 +13,25 @@ from mjspace.scenario.environment import Orbit
 
 _GEOM = mujoco.mjtObj.mjOBJ_GEOM
 AXES = 3
-"""The geom group of a model's body axes: not part of the vehicle, shown in pictures."""
-_HALO, _TRANSLUCENT = 2.2, 0.4  # the wanted axes' thickness, and their opacity
-_FASTEST = np.radians(30.0)  # a frame; a rotor of four spokes seems to reverse beyond 45 degrees
+"""The geom group of a model's body axes: no part of the vehicle, but drawn."""
+_HALO, _TRANSLUCENT = 2.2, 0.4  # the desired axes' thickness over the body's, and their opacity
+_FASTEST = np.radians(30.0)  # per frame: beyond 45 deg a rotor of four spokes seems to reverse
 _PLUME = 0.45  # the opacity of a thruster's plume
-_SPARE_GEOMS = 64  # beside the model's own: the wanted axes, and room
+_SPARE_GEOMS = 64  # in addition to the model's: the desired axes, with reserve
 
 
 class Stage:
     """A model's drawable scene, set to one instant after another.
 
-    The planet is turned with the orbit, so that it stays below. A rotor that turns too far between
-    two frames for the eye is drawn at 30 degrees a frame in its own sense.
+    The planet is rotated with the orbit, so that it is at nadir. A rotor that turns further than 30
+    degrees between two frames is drawn at 30 degrees per frame in its own sense.
     """
 
     def __init__(self, model: Any, camera: str, orbit: Orbit | None) -> None:
-        """Prepare to look at ``model`` through its camera of that name.
+        """Prepare to draw ``model`` through one of its cameras.
 
         Raises:
-            ValueError: there is no such camera, with those that there are.
+            ValueError: the camera does not exist; the message lists those that do.
         """
         names = [model.camera(index).name for index in range(model.ncam)]
         if camera not in names:
@@ -58,16 +58,15 @@ class Stage:
         self,
         time: float,
         physics: Array,
-        wanted: Array,
+        desired: Array,
         on_time: Array | None = None,
-        burning: float = 0.0,
+        thrust: float = 0.0,
     ) -> Array:
-        """Show ``time`` [s]: a row of MuJoCo's integration state, and the wanted attitude (4,).
+        """Set the scene to ``time`` [s] and return the attitude (4,) of the bus.
 
-        Thrusters whose ``on_time`` (n,) is more than zero have a plume; that of an engine is as
-        long as ``burning``, its share of full thrust, says.
-
-        Returns the attitude (4,) of the bus.
+        ``physics`` is a row of MuJoCo's integration state, ``desired`` the desired attitude (4,).
+        Thrusters with an ``on_time`` (n,) above zero have a plume. ``thrust`` is the engine's share
+        of its largest thrust, 0 to 1.
         """
         model, data = self.model, self._data
         mujoco.mj_setState(model, data, physics, mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -76,7 +75,7 @@ class Stage:
             self._turn_planet(orbit_position(self._orbit, time))
         if on_time is not None:
             model.geom_rgba[self._plumes, 3] = _PLUME * (on_time > 0.0)
-        self._plume.burn(burning, self._option)
+        self._plume.burn(thrust, self._option)
         mujoco.mj_fwdPosition(model, data)
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(
@@ -84,7 +83,7 @@ class Stage:
         )
         self._plume.lift_shadow(self.scene)
         for geom in self._axes:
-            self._add_wanted(geom, wanted)
+            self._add_desired(geom, desired)
         bus: Array = data.body("bus").xquat.copy()
         return bus
 
@@ -97,23 +96,23 @@ class Stage:
         self._data.qpos[self._rotors] = self._drawn
 
     def _turn_planet(self, up: Array) -> None:
-        """Move the planet from below, along -z, where the model has it, to opposite ``up``."""
+        """Move the planet from -z, where the model has it, to the direction opposite to ``up``."""
         turn = np.empty(4)
         mujoco.mju_quatZ2Vec(turn, up)
         place, orientation = self._below
         self.model.geom_pos[self._planet] = attitude.rotate(turn, place)
         self.model.geom_quat[self._planet] = attitude.multiply(turn, orientation)
 
-    def _add_wanted(self, axis: int, wanted: Array) -> None:
-        """Add a body axis as a halo where it ought to be."""
+    def _add_desired(self, axis: int, desired: Array) -> None:
+        """Add a halo for a body axis (a geom) at its desired orientation."""
         model, scene = self.model, self.scene
         origin = self._data.xpos[model.geom_bodyid[axis]]
         mujoco.mjv_initGeom(
             scene.geoms[scene.ngeom],
             model.geom_type[axis],
             model.geom_size[axis] * [_HALO, 1.0, 1.0],
-            origin + attitude.rotate(wanted, model.geom_pos[axis]),
-            attitude.to_matrix(attitude.multiply(wanted, model.geom_quat[axis])).ravel(),
+            origin + attitude.rotate(desired, model.geom_pos[axis]),
+            attitude.to_matrix(attitude.multiply(desired, model.geom_quat[axis])).ravel(),
             model.geom_rgba[axis] * [1.0, 1.0, 1.0, _TRANSLUCENT],
         )
         scene.ngeom += 1

@@ -1,4 +1,4 @@
-"""A video as it is encoded: frames in one by one, an H.264 file in MP4 out."""
+"""Encodes a video frame by frame: H.264 in an MP4 file."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -18,7 +18,7 @@ _OPTIONS = {"preset": "veryfast", "crf": "20"}
 
 
 class Video:
-    """An open MP4 file that any player and browser shows; deleted if it could not be finished."""
+    """An open MP4 file, playable in any player and browser; deleted if it cannot be finished."""
 
     def __init__(self, path: Path, size: tuple[int, int], rate: float) -> None:
         """Create the file for frames of ``size`` (width, height), ``rate`` of them a second.
@@ -34,14 +34,14 @@ class Video:
                 f"size {width}x{height}: a video's width and height must be even, as in {even}"
             )
         self._path = path
-        # The index before the pictures: playable before it is loaded whole.
+        # The index comes before the pictures: playable before it is loaded completely.
         self._file = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
         self._stream = self._file.add_stream(
             "libx264", rate=Fraction(rate).limit_denominator(1001), options=_OPTIONS
         )
         self._stream.width, self._stream.height = width, height
         self._stream.pix_fmt = "yuv420p"
-        # Without these players guess the colours by the picture's size.
+        # Without these, players guess the colours from the picture's size.
         context = self._stream.codec_context
         context.colorspace = context.color_primaries = context.color_trc = BT709
 

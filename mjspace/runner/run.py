@@ -56,7 +56,7 @@ def run(
     """Fly a scenario, by name or path, and judge it; the log is ``flight.mcap`` in ``out``.
 
     ``overrides`` are ``"key=value"``, as ``--set`` takes them; ``out`` is
-    runs/<scenario>/<UTC stamp> when left out.
+    ``runs/<scenario>/<UTC stamp>`` when left out.
 
     Raises:
         InputError: bad input, in one line; nothing has been written.

@@ -3,7 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from importlib import import_module
-from typing import Any, ClassVar, Self
+from types import GenericAlias
+from typing import Any, ClassVar, Self, get_args, get_origin
 
 from pydantic import BaseModel, GetCoreSchemaHandler, RootModel
 from pydantic.fields import FieldInfo
@@ -47,10 +48,14 @@ def declaration(field: FieldInfo) -> DeclaredIn | None:
 
 
 def type_of(field: FieldInfo) -> Any:
-    """Return the type of what a key holds in TOML, wherever its table is declared."""
+    """Return the type of what a key holds in TOML, wherever its table or its items' is declared."""
     declared = declaration(field)
     if declared is None:
-        return field.annotation
+        if get_origin(field.annotation) is not list:
+            return field.annotation
+        (item,) = get_args(field.annotation)
+        marks = [mark for mark in get_args(item)[1:] if isinstance(mark, DeclaredIn)]
+        return GenericAlias(list, marks[0].table) if marks else field.annotation
     table = declared.table
     return table.model_fields["root"].annotation if issubclass(table, RootModel) else table
 

@@ -1,7 +1,7 @@
 """A scenario, whole: what flies, where, under which law, how long, and what it must show."""
 
 import math
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -16,7 +16,7 @@ from pydantic import (
 from mjspace.contract import TICK
 from mjspace.ranges import numbers
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.faults import Fault
+from mjspace.scenario.equipment import DeclaredIn
 from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
@@ -165,7 +165,7 @@ class Scenario(Table):
     sensors: Sensors = Sensors()
     reference: Component
     law: Component
-    faults: list[Fault] = []
+    faults: list[Annotated[Any, DeclaredIn("mjspace.actuators.faults:Fault", optional=False)]] = []
     checks: list[Check] = []
     events: list[EventTable] = []
 

@@ -115,16 +115,16 @@ def check_step(returned: Any) -> None:
 
 
 def check_inner(returned: Any) -> None:
-    """Refuse what a law's ``inner`` must not return.
+    """Refuse what a law's inner loop must not return.
 
     Raises:
-        FlightError: anything but (state, command), with what it is instead.
+        FlightError: anything but (state, command), with what was returned.
     """
-    right = type(returned) is tuple and len(returned) == 2
-    if not (right and _is_optional(returned[0]) and _is_named(returned[1])):
+    good = type(returned) is tuple and len(returned) == 2
+    if not (good and _is_optional(returned[0]) and _is_named(returned[1])):
         raise FlightError(
             f"the law's inner loop returned {_described(returned)}: it must return (state, "
-            "command), each a named tuple of arrays; state may be None"
+            "command), named tuples of arrays; state may be None"
         )
 
 

@@ -106,6 +106,11 @@ class Broken(ReactionWheels):
         raise KeyError("its own")
 
 
+class BrokenSensor(ReactionWheels):
+    def measured(self, state: Any, truth: Any) -> Any:
+        raise KeyError("its own")
+
+
 class Misshapen(ReactionWheels):
     def act(self, state: Any, command: Any, truth: Any, step: float) -> Any:
         return state, np.zeros((2, 4)), np.zeros((2, 3))
@@ -126,6 +131,12 @@ def test_an_actuators_fault_is_reported_as_its_own(
 ) -> None:
     with pytest.raises(FlightError, match=message):
         ActuatorSet((kind(np.eye(3)),)).act({}, TorqueCommand(np.zeros((2, 3))), TRUTH, 0.1)
+
+
+def test_so_is_one_in_its_measurement() -> None:
+    broken = ActuatorSet((BrokenSensor(np.eye(3)),))
+    with pytest.raises(FlightError, match=r"the actuator BrokenSensor .* raised KeyError at "):
+        broken.seen({}, TRUTH)
 
 
 @pytest.mark.parametrize("other", [ReactionWheels(np.eye(3)[:1]), CoilSet(np.eye(3))])

@@ -118,16 +118,25 @@ def test_valves_share_one_tank_and_a_batch_is_its_vehicles() -> None:
     np.testing.assert_allclose(together["cold_gas"], one_by_one["cold_gas"], rtol=1e-14)
 
 
-def test_what_a_stuck_valve_spends_leaves_the_tank() -> None:
-    flown = thrusters(2)
-    state, applied = flown.reset(1), np.zeros((1, 2))
-    stuck = np.array([[0.0, 0.5]])
-    after, thrust = flown.account_propellant(state, applied, stuck, STEP)
+def test_what_a_stuck_valve_spends_leaves_the_tank_at_its_exhaust_speed() -> None:
+    flown, applied, stuck = thrusters(2, exponent=1.4), np.zeros((1, 2)), np.array([[0.0, 0.5]])
+    half = flown.reset(1) | {"cold_gas": np.full((1, 1), 0.5 * GAS)}
+    after, thrust = flown.account_propellant(half, applied, stuck, STEP)
     np.testing.assert_array_equal(thrust, stuck)
-    assert GAS - after["cold_gas"][0, 0] == pytest.approx(0.5 * STEP / SPEED, rel=1e-9)
+    speed = SPEED * 0.5**0.2  # it falls with the root of the temperature, (1/2)^(n - 1)
+    assert 0.5 * GAS - after["cold_gas"][0, 0] == pytest.approx(0.5 * STEP / speed, rel=1e-9)
     empty = {"cold_gas": np.zeros((1, 1)), "cold_gas_step": np.zeros((1, 1))}
     after, thrust = flown.account_propellant(empty, applied, stuck, STEP)
     assert not thrust.any()
+
+
+def test_the_tank_has_the_mass_of_the_middle_of_the_step_and_keeps_its_shape() -> None:
+    flown = thrusters()
+    before, after = ({"cold_gas": np.full((1, 1), gas)} for gas in (0.04, 0.02))
+    masses = flown.masses(before, after)
+    assert {body for body, _ in masses.values()} == {1}
+    np.testing.assert_allclose(masses["body_mass"][1], [0.03])
+    np.testing.assert_allclose(masses["body_inertia"][1], [[1.2e-4] * 3])
 
 
 def test_a_satellite_is_turned_by_gas_and_its_log_is_flown_again(tmp_path: Path) -> None:

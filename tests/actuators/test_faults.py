@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mjspace.actuators.faults import FaultSet, between
+from mjspace.actuators.faults import Fault, FaultSet, between
 from mjspace.actuators.ideal_thrusters import IdealThrusters
 from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.runner.replay import verify
 from mjspace.runner.run import run
-from mjspace.scenario.faults import Fault
 from mjspace.scenario.loading import load
 from mjspace.sensors.noise import normals
 from mjspace.simulation.assembly import assemble

@@ -1,4 +1,4 @@
-"""The recipe of docs/extending.md for an actuator: its file and its line, followed and flown."""
+"""The recipes of docs/extending.md for actuators and faults: file and line, followed and flown."""
 
 import importlib.util
 import re
@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from pydantic import Field, ValidationError, create_model
 
+from mjspace.actuators.fault_kinds import KINDS
+from mjspace.actuators.faults import Fault, FaultSet
+from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.contract import Array
 from mjspace.errors import FlightError
 from mjspace.runner.run import Result, fly_to_log
@@ -38,12 +41,16 @@ class Push:
 """
 
 
+def blocks(section: str) -> list[str]:
+    """Return the Python of a section of the page: a file and a line."""
+    text = PAGE.read_text().partition(f"\n## {section}\n")[2].partition("\n## ")[0]
+    return re.findall(r"^```python[^\n]*\n(.*?)^```$", text, re.M | re.S)
+
+
 @pytest.fixture
 def recipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[Scenario]:
     """Return the scenario with the line of the recipe, whose file stands in another folder."""
-    section = PAGE.read_text().partition("## An actuator\n")[2].partition("\n## ")[0]
-    blocks = re.findall(r"^```python[^\n]*\n(.*?)^```$", section, re.M | re.S)
-    file, line = blocks
+    file, line = blocks("An actuator")
     path = tmp_path / "ion_thruster.py"
     path.write_text(file)
     spec = importlib.util.spec_from_file_location(MODULE, path)
@@ -117,3 +124,19 @@ def test_what_it_raises_in_flight_is_reported_as_its_own(
     message = r"the actuator Throttle \(ion_thrust\) raised ZeroDivisionError at test_recipe.py:\d+"
     with pytest.raises(FlightError, match=message):
         fly(recipe, tmp_path, thrust=1.0)
+
+
+def test_a_new_kind_of_fault_is_a_class_and_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    file, line = blocks("A fault of an actuator")
+    names: dict[str, Any] = {}
+    exec(file, names)
+    for name, kind in eval(f"{{{line}}}", names).items():
+        monkeypatch.setitem(KINDS, name, kind)
+    fault = Fault.model_construct(motor="wheel_1", kind="reversed", value=None, at=0.1)
+    faults = FaultSet([fault], [ReactionWheels(np.eye(3))], hold=0.1, seed=0, members=[0])
+    state, rows = faults.reset(), []
+    for period in range(3):
+        state, _ = faults.decide(state, 0.1 * period, None)
+        state, (row,) = faults.change(state, (np.ones((1, 3)),), 0.1 * period)
+        rows.append(row[0].tolist())
+    assert rows == [[1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, -1.0, 1.0]]

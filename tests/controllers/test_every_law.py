@@ -1,16 +1,22 @@
-"""Every law of controllers/, found by itself: it is a pure function, of one vehicle or of many."""
+"""The conformance suite: what every law in controllers/, found by discovery, must satisfy.
+
+Each property is a function of (law, control period, instants) that raises AssertionError. A law
+that breaks it is at the end of this file, so that each property is known to be able to fail.
+"""
 
 import functools
 import importlib
 import inspect
+import sys
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from mjspace import attitude as att
-from mjspace.contract import Measurement, Reference
+from mjspace.contract import Array, Measurement, Reference, TorqueCommand
 from mjspace.scenario.construct import controllers
 from mjspace.scenario.loading import load, scenario_names
 from mjspace.simulation.assembly import assemble
@@ -47,7 +53,7 @@ def flown() -> dict[str, str]:
 
 
 class Watched:
-    """A law whose inputs are kept."""
+    """A law that records what ``step`` receives."""
 
     def __init__(self, law: Any) -> None:
         self.law = law
@@ -99,12 +105,13 @@ def leaves(parts: Any) -> list[np.ndarray]:
 
 
 def same(one: Any, other: Any) -> bool:
+    """Return whether all arrays are the same, bit for bit but for the payload of a NaN."""
     pairs = zip(leaves(one), leaves(other), strict=True)
     return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
 
 
 def outcome(law: Any, period: float, instants: Any) -> tuple[Any, ...]:
-    """Return what the law hands back at reset, at each instant, and from its inner loop."""
+    """Return what the law returns at reset, at each instant, and from its inner loop."""
     state = law.reset(*instants[0])
     found = [state]
     for number, (seen, wanted) in enumerate(instants):
@@ -117,60 +124,248 @@ def outcome(law: Any, period: float, instants: Any) -> tuple[Any, ...]:
 
 
 UNWINDS = {"quaternion_feedback:Fixed"}
-"""Laws to which q and -q are two attitudes: it is what they are there to show."""
-
-every_law = pytest.mark.parametrize("kind", laws())
+"""Laws for which q and -q are different attitudes, to show what follows from that."""
 
 
-def test_they_are_found() -> None:
+def writable(instants: Any) -> Any:
+    return [
+        tuple(type(arrays)(*map(np.array, arrays)) for arrays in instant) for instant in instants
+    ]
+
+
+def repeats(law: Any, period: float, instants: Any) -> None:
+    """The same inputs give the same outputs: no memory but the state."""
+    assert same(outcome(law, period, instants), outcome(law, period, instants))
+
+
+def keeps_memory(law: Any, period: float, instants: Any) -> None:
+    """A step and an inner step leave the state that they receive as it was."""
+    state = law.reset(*instants[0])
+    for number, (seen, desired) in enumerate(instants):
+        before = [leaf.copy() for leaf in leaves(state)]
+        after, command, _ = law.step(state, number * period, seen, desired)
+        assert all(map(np.array_equal, before, leaves(state)))
+        if hasattr(law, "inner"):
+            before = [leaf.copy() for leaf in leaves(after)]
+            inner_after, _ = law.inner(after, number * period, command, seen)
+            assert all(map(np.array_equal, before, leaves(after)))
+            after = inner_after
+        state = after
+
+
+def keeps_inputs(law: Any, period: float, instants: Any) -> None:
+    """Measurement and reference are not written to, even where they could be."""
+    handed = writable(instants)
+    outcome(law, period, handed)
+    assert all(same(*pair) for pair in zip(handed, instants, strict=True))
+
+
+def shares_nothing(law: Any, period: float, instants: Any) -> None:
+    """No output is a view of an input, where a sensor may write its next sample."""
+    inputs = [array for instant in instants for array in leaves(instant)]
+    outputs = leaves(outcome(law, period, instants))
+    assert not any(np.shares_memory(one, other) for one in outputs for other in inputs)
+
+
+def is_finite(law: Any, period: float, instants: Any) -> None:
+    """The state and the commands are finite; a law may well signal infinity."""
+    state = law.reset(*instants[0])
+    for number, (seen, desired) in enumerate(instants):
+        state, command, _ = law.step(state, number * period, seen, desired)
+        assert all(np.isfinite(leaf).all() for leaf in leaves((state, command)))
+        if hasattr(law, "inner"):
+            state, command = law.inner(state, number * period, command, seen)
+            assert all(np.isfinite(leaf).all() for leaf in leaves((state, command)))
+
+
+def is_batched(law: Any, period: float, instants: Any) -> None:
+    """Each vehicle of a batch gets, bit for bit, what it gets alone."""
+    batch = leaves(outcome(law, period, instants))
+    for index in range(COUNT):
+        part = slice(index, index + 1)
+        lone = [
+            (type(seen)(*(a[part] if a.size else a for a in seen)), desired)
+            for seen, desired in instants
+        ]
+        for one, many in zip(leaves(outcome(law, period, lone)), batch, strict=True):
+            assert np.array_equal(one, many[part] if many.size else many, equal_nan=True)
+
+
+def flipped(instants: Any) -> Any:
+    """Return the instants with the sign of some of the vehicles' measured quaternions changed."""
+    signs = np.array([[-1.0], [1.0], [-1.0], [1.0]])
+    return [(seen._replace(attitude=signs * seen.attitude), desired) for seen, desired in instants]
+
+
+def takes_either_sign(law: Any, period: float, instants: Any) -> None:
+    """q and -q are one attitude: the commands are the same, bit for bit."""
+    other = flipped(instants)
+    one_state, other_state = law.reset(*instants[0]), law.reset(*other[0])
+    for number in range(len(instants)):
+        now = number * period
+        one_state, one, _ = law.step(one_state, now, *instants[number])
+        other_state, another, _ = law.step(other_state, now, *other[number])
+        assert same(one, another)  # a change of sign is exact in floating point
+        if hasattr(law, "inner"):
+            one_state, one = law.inner(one_state, now, one, instants[number][0])
+            other_state, another = law.inner(other_state, now, another, other[number][0])
+            assert same(one, another)
+
+
+def needs_no_engine(law: Any, period: float, instants: Any) -> None:
+    """Nothing of a step imports MuJoCo or the log's library, not even late."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("mujoco", "mcap"):
+            patch.setitem(sys.modules, module, None)
+        try:
+            outcome(law, period, instants)
+        except ImportError as error:
+            raise AssertionError(str(error)) from error
+
+
+PROPERTIES = (
+    repeats,
+    keeps_memory,
+    keeps_inputs,
+    shares_nothing,
+    is_finite,
+    is_batched,
+    takes_either_sign,
+    needs_no_engine,
+)
+
+
+def test_the_laws_are_found() -> None:
     assert len(laws()) >= 33
     assert {"contraction:Ideal", "lander:VariableStructure", "phases:Phases"} <= set(laws())
 
 
-@every_law
-def test_it_is_a_pure_function(kind: str) -> None:
-    law, period, instants = inputs(kind)
-    first = outcome(law, period, instants)
-    assert same(first, outcome(law, period, instants))
-    _, command, _ = law.step(first[0], 0.0, *instants[0])
-    assert all(np.isfinite(leaf).all() for leaf in leaves(command))
-    # from a state that nobody may write to, which then is as it was
-    state = first[0]
-    before = [leaf.copy() for leaf in leaves(state)]
-    for leaf in leaves(state):
-        leaf.flags.writeable = False
-    once, twice = (law.step(state, 0.0, *instants[0]) for _ in range(2))
-    assert same(once, twice)
-    assert all(np.array_equal(a, b) for a, b in zip(before, leaves(state), strict=True))
-    # a sensor may write its next sample where the last one was
-    kept = [array for seen, wanted in instants for array in (*seen, *wanted)]
-    assert not any(np.shares_memory(leaf, a) for leaf in leaves(first) for a in kept)
+@pytest.mark.parametrize("kind", laws())
+@pytest.mark.parametrize("holds", PROPERTIES, ids=lambda holds: holds.__name__)
+def test_every_law(kind: str, holds: Callable[..., None]) -> None:
+    if kind in UNWINDS and holds is takes_either_sign:
+        with pytest.raises(AssertionError):
+            holds(*inputs(kind))
+        return
+    holds(*inputs(kind))
 
 
-@every_law
-def test_one_vehicle_alone_is_the_same_bits(kind: str) -> None:
-    law, period, instants = inputs(kind)
-    batch = leaves(outcome(law, period, instants))
-    for index in range(COUNT):
-        lone = [
-            (type(seen)(*(a[index : index + 1] if a.size else a for a in seen)), wanted)
-            for seen, wanted in instants
-        ]
-        alone = leaves(outcome(law, period, lone))
-        for one, many in zip(alone, batch, strict=True):
-            assert np.array_equal(
-                one, many[index : index + 1] if many.size else many, equal_nan=True
-            )
+class Memory(NamedTuple):
+    rate: Array
 
 
-@every_law
-def test_q_and_minus_q_are_one_attitude(kind: str) -> None:
-    law, period, instants = inputs(kind)
-    signs = np.array([[-1.0], [1.0], [-1.0], [1.0]])
-    flipped = [(seen._replace(attitude=signs * seen.attitude), wanted) for seen, wanted in instants]
-    state, other = law.reset(*instants[0]), law.reset(*flipped[0])
-    for number, (here, there) in enumerate(zip(instants, flipped, strict=True)):
-        state, command, _ = law.step(state, number * period, *here)
-        other, turned, _ = law.step(other, number * period, *there)
-        # a change of sign is exact in floating point
-        assert same(command, turned) is (kind not in UNWINDS)
+class Damper:
+    """A law that has every property."""
+
+    def reset(self, measurement: Measurement, reference: Reference) -> Memory:
+        return Memory(measurement.rate.copy())
+
+    def step(
+        self, state: Memory, time: float, measurement: Measurement, reference: Reference
+    ) -> tuple[Memory, TorqueCommand, None]:
+        error = att.multiply(att.conjugate(reference.attitude), measurement.attitude)
+        turn = np.sign(error[..., :1]) * error[..., 1:]
+        torque = -turn - measurement.rate - 0.1 * state.rate
+        return Memory(measurement.rate.copy()), TorqueCommand(torque), None
+
+
+class Counts(Damper):
+    calls = 0
+
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        Counts.calls += 1
+        state, command, _ = super().step(state, time, measurement, reference)
+        return state, TorqueCommand(command.torque + 1e-9 * Counts.calls), None
+
+
+class WritesItsMemory(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        result = super().step(state, time, measurement, reference)
+        state.rate[...] += 1.0
+        return result
+
+
+class WritesTheMeasurement(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        if measurement.rate.flags.writeable:
+            measurement.rate[...] = 0.0
+        return super().step(state, time, measurement, reference)
+
+
+class WritesTheReference(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        if reference.attitude.flags.writeable:
+            reference.attitude[...] *= -1.0
+        return super().step(state, time, measurement, reference)
+
+
+class KeepsAView(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        _, command, signals = super().step(state, time, measurement, reference)
+        return Memory(measurement.rate[:]), command, signals
+
+
+class Divides(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        state, command, signals = super().step(state, time, measurement, reference)
+        with np.errstate(all="ignore"):
+            return state, TorqueCommand(command.torque / (0.0 * time)), signals
+
+
+class DivergesInside(Damper):
+    def inner(self, state: Any, time: float, command: Any, measurement: Any) -> Any:
+        return Memory(np.full_like(state.rate, np.inf)), command
+
+
+class Averages(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        state, command, signals = super().step(state, time, measurement, reference)
+        return state, TorqueCommand(command.torque + command.torque.mean(axis=0)), signals
+
+
+class Unwinds(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        error = att.multiply(att.conjugate(reference.attitude), measurement.attitude)
+        return state, TorqueCommand(-error[..., 1:] - measurement.rate), None
+
+
+class UnwindsInside(Damper):
+    def inner(self, state: Any, time: float, command: Any, measurement: Any) -> Any:
+        return state, TorqueCommand(command.torque - measurement.attitude[..., 1:])
+
+
+class Imports(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        import mujoco
+
+        assert mujoco
+        return super().step(state, time, measurement, reference)
+
+
+BREAKS = [
+    (repeats, Counts),
+    (keeps_memory, WritesItsMemory),
+    (keeps_inputs, WritesTheMeasurement),
+    (keeps_inputs, WritesTheReference),
+    (shares_nothing, KeepsAView),
+    (is_finite, Divides),
+    (is_finite, DivergesInside),
+    (is_batched, Averages),
+    (takes_either_sign, Unwinds),
+    (takes_either_sign, UnwindsInside),
+    (needs_no_engine, Imports),
+]
+
+
+@pytest.mark.parametrize(("property_", "broken"), BREAKS)
+def test_a_law_that_breaks_a_property_is_found(
+    property_: Callable[..., None], broken: type[Damper]
+) -> None:
+    _, period, instants = inputs("contraction:Ideal")
+    property_(Damper(), period, instants)
+    with pytest.raises(AssertionError):
+        property_(broken(), period, instants)
+
+
+def test_each_property_can_fail() -> None:
+    assert {holds for holds, _ in BREAKS} == set(PROPERTIES)

@@ -1,7 +1,8 @@
-"""What every law must do: change nothing it is given, and fly one vehicle or many, either sign."""
+"""Attitude laws over many samples: alone or in a batch, any leading axes, either sign, bad input.
 
-import subprocess
-import sys
+What every law must satisfy is in test_every_law.py.
+"""
+
 from typing import Any
 
 import numpy as np
@@ -56,32 +57,6 @@ def wanted(rows: int) -> list[Reference]:
     return [Reference(*(part[k] for part in parts)) for k in range(rows)]
 
 
-def copied(arrays: Any) -> Any:
-    return type(arrays)(*(array.copy() for array in arrays))
-
-
-def same(one: Any, other: Any) -> bool:
-    return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
-
-
-@laws
-def test_a_step_is_a_pure_function(law: Any) -> None:
-    (seen, later), (reference, next_) = readings(3, 2), wanted(2)
-    state = law.reset(seen, reference)
-    state, *_ = law.step(state, 0.0, seen, reference)
-    before = copied(state)
-    for array in state:
-        array.flags.writeable = False
-    once = law.step(state, PERIOD, later, next_)
-    twice = law.step(state, PERIOD, later, next_)
-    assert all(same(a, b) for a, b in zip(once, twice, strict=True))
-    assert same(state, before)
-    # A sensor may write its next sample where the last one was.
-    returned = (*law.reset(seen, reference), *(array for part in once for array in part))
-    for given in (*seen, *reference, *later, *next_):
-        assert not any(np.shares_memory(array, given) for array in returned)
-
-
 @laws
 def test_alone_and_in_a_batch_are_the_same_bits(law: Any) -> None:
     count, rows = 64, 40
@@ -107,7 +82,7 @@ def test_alone_and_in_a_batch_are_the_same_bits(law: Any) -> None:
 
 
 @laws
-def test_any_leading_axes_will_do(law: Any) -> None:
+def test_any_leading_axes_are_accepted(law: Any) -> None:
     seen, reference = readings(6, 1)[0], wanted(1)[0]
     flat = law.step(law.reset(seen, reference), 0.0, seen, reference)
     for lead in ((2, 3), ()):
@@ -184,19 +159,6 @@ def test_a_bad_measurement_is_not_hidden(law: Any) -> None:
     assert np.isfinite(command.torque[1]).all()
 
 
-def test_no_law_needs_the_physics_engine() -> None:
-    code = (
-        "import importlib, pkgutil, sys\n"
-        "sys.modules['mujoco'] = sys.modules['mcap'] = None\n"
-        "import mjspace.controllers as package\n"
-        "for found in pkgutil.walk_packages(package.__path__, package.__name__ + '.'):\n"
-        "    importlib.import_module(found.name)\n"
-        "    print(found.name.rpartition('.')[2])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert {"contraction", "immersion_invariance", "references"} <= set(done.stdout.split())
-
-
 @pytest.mark.parametrize(
     ("build", "message"),
     [
@@ -204,7 +166,7 @@ def test_no_law_needs_the_physics_engine() -> None:
         (lambda: Ideal(H, AXES, JW, torque_limit=-1.0), "torque_limit: got -1"),
         (lambda: Gradient(0.0), "control_period: got 0"),
         (lambda: Adaptive(PERIOD, forgetting=-0.1), "forgetting: got -0.1 1/s"),
-        (lambda: Adaptive(0.5, filter_bandwidth=3.0), "3 rad/s, control_period 0.5 s: less than 2"),
+        (lambda: Adaptive(0.5, filter_bandwidth=3.0), "got 3 rad/s, should be less than 2"),
         (lambda: ImmersionInvariance(H, AXES, JW, target_gain=-1.0), "target_gain: got -1 1/s"),
     ],
 )

@@ -308,7 +308,7 @@ def test_the_plume_on_stage_is_the_logged_thrust(descent: Log) -> None:
     assert 0.1 < share < 1.0
     physics = descent.nearest("/state", 0.5)["physics"]
     for burning in (share, 0.0):
-        stage.set(0.5, physics, np.array([1.0, 0.0, 0.0, 0.0]), burning=burning)
+        stage.set(0.5, physics, np.array([1.0, 0.0, 0.0, 0.0]), thrust=burning)
         drawn = [
             shape
             for shape in stage.scene.geoms[: stage.scene.ngeom]

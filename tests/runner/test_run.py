@@ -1,8 +1,8 @@
-"""A flight into a log: what is told on the way, what is judged, how one that breaks off ends."""
+"""Runs: progress, verdict, log, and flights that break off."""
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,22 +20,6 @@ SHORT = [
     "{name='fast',signal='truth.rate',below=0.1}]",
     "events=[{name='turns',signal='truth.rate',above=0.1}]",
 ]
-LAW = """
-from typing import NamedTuple
-import numpy as np
-
-class Command(NamedTuple):
-    torque: np.ndarray
-
-class Law:
-    def reset(self, measurement, reference):
-        return None
-
-    def step(self, state, time, measurement, reference):
-        if time > 0.0505:
-            raise ArithmeticError("no way on")
-        return None, Command(np.zeros(3)), ()
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -61,8 +45,10 @@ def test_progress_is_the_time_of_each_block_and_the_verdict_of_the_whole_log(
     assert run("detumble-wheels", overrides=SHORT, out=tmp_path / "new").path == result.path
 
 
-def test_a_flight_that_breaks_off_fails_though_its_checks_hold(tmp_path: Path) -> None:
-    (tmp_path / "law.py").write_text(LAW)
+def test_a_flight_that_breaks_off_fails_though_its_checks_hold(
+    tmp_path: Path, failing_law: Callable[[float], None]
+) -> None:
+    failing_law(0.0505)
     (tmp_path / "x.toml").write_text(
         'base = "detumble-wheels"\nduration = 0.1\nchecks = []\n[law]\nkind = "law.py:Law"\n'
     )

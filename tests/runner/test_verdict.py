@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,23 +32,6 @@ above = 0.4
 FAST = '[[checks]]\nname = "fast"\nsignal = "truth.rate"\nabove = {above}\n'
 FAILS = 'expected = "FAIL"\nbecause = "0.44 rad/s is slow"\n'
 LATER = '[[checks]]\nname = "later"\nsignal = "truth.rate"\nsince = "at rest"\nbelow = 1\n'
-
-LAW = """
-from typing import NamedTuple
-import numpy as np
-
-class Command(NamedTuple):
-    torque: np.ndarray
-
-class Law:
-    def reset(self, measurement, reference):
-        return None
-
-    def step(self, state, time, measurement, reference):
-        if time > 0.0205:
-            raise ArithmeticError("no way on")
-        return None, Command(np.zeros(3)), ()
-"""
 
 CASES = {
     "all is met": ("", True, {"turns": "PASS"}),
@@ -119,9 +103,12 @@ def test_the_table_says_what_was_expected_and_why(
 
 
 def test_a_flight_that_ends_early_fails_whatever_its_checks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    failing_law: Callable[[float], None],
 ) -> None:
-    (tmp_path / "law.py").write_text(LAW)
+    failing_law(0.0205)
     (tmp_path / "x.toml").write_text(
         SCENARIO + FAST.format(above=0.5) + FAILS + '[law]\nkind = "law.py:Law"\n'
     )

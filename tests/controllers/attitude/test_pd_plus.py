@@ -9,7 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from mjspace.controllers.attitude.pd_plus import Classical, Modified, Robust, State, wanted_torque
+from mjspace.controllers.attitude.pd_plus import (
+    Classical,
+    Modified,
+    Robust,
+    State,
+    commanded_torque,
+)
 from mjspace.controllers.references.rate_references import Sinusoids
 from numba import njit
 
@@ -167,7 +173,7 @@ def test_the_attitude_error_is_corrected() -> None:
 
 def torque_at(attitude: Array, rate: Array, momentum: Array, sigma_d: Array) -> tuple[Array, ...]:
     still = Reference(att.from_mrp(sigma_d), np.zeros(3), np.zeros(3))
-    return wanted_torque(attitude, rate, momentum, still, M, GAINS)
+    return commanded_torque(attitude, rate, momentum, still, M, GAINS)
 
 
 @laws
@@ -196,7 +202,7 @@ def test_the_lyapunov_function_falls_as_proved(wheel: float, bound: float) -> No
 
         def seen(shift: float, q: Array, w: Array, stored: Array) -> tuple[Array, ...]:
             now = Reference(*(part[0] for part in reference.at(np.array([t + shift]))))
-            return wanted_torque(q, w, M @ w + stored, now, M, gains)
+            return commanded_torque(q, w, M @ w + stored, now, M, gains)
 
         torque, sigma_e, s = seen(0.0, q, w, stored)
         dw = np.linalg.solve(M, np.cross(M @ w + stored, w) + torque)

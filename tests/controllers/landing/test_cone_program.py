@@ -84,4 +84,4 @@ def test_elimination_solves() -> None:
     rng = np.random.default_rng(2)
     root = rng.normal(size=(6, 6))
     matrix, x = root @ root.T + np.eye(6), rng.normal(size=6)
-    assert cone_program._solved(matrix, matrix @ x) == pytest.approx(x, abs=1e-12)
+    assert cone_program._solve(matrix, matrix @ x) == pytest.approx(x, abs=1e-12)

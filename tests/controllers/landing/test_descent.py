@@ -115,7 +115,7 @@ def test_bezier_starts_as_table_3_upright_and_ends_descending() -> None:
     [
         (lambda: SineDescent(duration=0.0), "duration: got 0 s"),
         (lambda: BezierDescent(duration=-1.0), "duration: got -1 s"),
-        (lambda: BezierDescent(points=np.zeros((4, 3))), "4 rows: 5 or more"),
+        (lambda: BezierDescent(points=np.zeros((4, 3))), "got 4 rows, should be 5 or more"),
     ],
 )
 def test_what_cannot_be_is_refused(build: Any, message: str) -> None:

@@ -1,4 +1,4 @@
-"""The plan of a descent: within its limits, the thriftiest, the same on any number of threads."""
+"""The plan of a descent: within its limits, of least propellant, equal on any number of threads."""
 
 import os
 import subprocess
@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 from mjspace.controllers.landing import guidance
 from mjspace.controllers.landing.bezier import curve
-from mjspace.controllers.landing.descent_limits import Limits, keeps, shortest_duration, thriftiest
+from mjspace.controllers.landing.descent_limits import (
+    Limits,
+    keeps,
+    least_propellant,
+    shortest_duration,
+)
 from mjspace.controllers.landing.guidance import EXHAUST_SPEED, TABLE_3, burnt, plan
 
 PLACE, VELOCITY = np.array([2500.0, 0.0, 1000.0]), np.array([-24.0, -7.0, -10.0])
@@ -39,7 +44,7 @@ def test_the_plan_is_the_one_that_is_kept() -> None:
     assert propellant(points, duration) == pytest.approx(kept, abs=2e-4)
     assert duration == pytest.approx(79.346, abs=0.05)  # where the search stops
     assert np.abs(points - np.array(TABLE_3)).max() < 20.0
-    same = thriftiest(79.346, PLACE, VELOCITY, MOON)[0]
+    same = least_propellant(79.346, PLACE, VELOCITY, MOON)[0]
     np.testing.assert_allclose(same, TABLE_3, rtol=0.0, atol=0.01)  # rounded to 0.0005
     for each, length in ((points, duration), (np.array(TABLE_3), 79.346)):
         assert keeps(each, length, PLACE, VELOCITY, MOON)
@@ -82,7 +87,7 @@ class Costs:
     def __init__(self, cost: Callable[[float], float]) -> None:
         self.cost, self.tried = cost, list[float]()
 
-    def thriftiest(self, duration: float, *_: object) -> tuple[np.ndarray, float]:
+    def least_propellant(self, duration: float, *_: object) -> tuple[np.ndarray, float]:
         self.tried.append(duration)
         return np.zeros((10, 3)), self.cost(duration)
 
@@ -90,7 +95,7 @@ class Costs:
         """Return the duration that the search finds."""
         self.tried.clear()
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(guidance, "thriftiest", self.thriftiest)
+            patch.setattr(guidance, "least_propellant", self.least_propellant)
             patch.setattr(guidance, "keeps", lambda *_: True)
             return plan(place, velocity)[0]
 
@@ -126,7 +131,7 @@ def test_no_duration_is_tried_that_gravity_losses_alone_make_dearer(
 
 def test_the_least_is_found_with_one_cost_for_each_step() -> None:
     costs = Costs(lambda duration: (duration - 77.7) ** 2)
-    found = guidance._golden(lambda duration: costs.thriftiest(duration)[1], 60.0, 90.0)
+    found = guidance._golden(lambda duration: costs.least_propellant(duration)[1], 60.0, 90.0)
     assert found == pytest.approx(77.7, abs=0.025)
     # Each leaves 0.618 of what was left: 30 s * 0.618^14 = 0.036 s; two begin.
     assert len(costs.tried) == 16
@@ -135,8 +140,8 @@ def test_the_least_is_found_with_one_cost_for_each_step() -> None:
 def test_it_is_the_same_on_any_number_of_threads() -> None:
     program = (
         "import numpy as np\n"
-        "from mjspace.controllers.landing.descent_limits import Limits, thriftiest\n"
-        f"points, cost = thriftiest(30.0, np.array({ABOVE.tolist()}), np.zeros(3), {MOON})\n"
+        "from mjspace.controllers.landing.descent_limits import Limits, least_propellant\n"
+        f"points, cost = least_propellant(30.0, np.array({ABOVE.tolist()}), np.zeros(3), {MOON})\n"
         "print(cost.hex(), points.tobytes().hex())\n"
     )
     said = set()
@@ -151,13 +156,13 @@ def test_it_is_the_same_on_any_number_of_threads() -> None:
         )
         assert ran.returncode == 0, ran.stderr
         said.add(ran.stdout)
-    points, cost = thriftiest(30.0, ABOVE, AT_REST, MOON)
+    points, cost = least_propellant(30.0, ABOVE, AT_REST, MOON)
     assert said == {f"{cost.hex()} {points.tobytes().hex()}\n"}
 
 
 @pytest.mark.parametrize("duration", [78.0, 81.0])
 def test_a_longer_or_shorter_descent_burns_more(duration: float) -> None:
-    points = thriftiest(duration, PLACE, VELOCITY, MOON)[0]
+    points = least_propellant(duration, PLACE, VELOCITY, MOON)[0]
     assert keeps(points, duration, PLACE, VELOCITY, MOON)
     more = propellant(points, duration) - propellant(TABLE_3, 79.346)
     assert 0.004 < more < 0.011  # 0.0056 and 0.0080
@@ -165,7 +170,7 @@ def test_a_longer_or_shorter_descent_burns_more(duration: float) -> None:
 
 def test_moving_a_point_burns_more_or_breaks_a_limit() -> None:
     """At 40 s, where the thrust has room all along but for its least."""
-    points, cost = thriftiest(40.0, ABOVE, AT_REST, MOON)
+    points, cost = least_propellant(40.0, ABOVE, AT_REST, MOON)
     assert keeps(points, 40.0, ABOVE, AT_REST, MOON)
     assert cost * 162.283 / EXHAUST_SPEED == pytest.approx(propellant(points, 40.0), abs=2e-3)
     free = [(row, axis) for row in (4, 5) for axis in (0, 1)] + [(row, 2) for row in range(2, 8)]
@@ -179,8 +184,8 @@ def test_moving_a_point_burns_more_or_breaks_a_limit() -> None:
 
 def test_a_heavier_vehicle_with_more_thrust_flies_the_same() -> None:
     heavy = replace(MOON, mass=250.0, thrust=(175.0, 675.0))
-    assert thriftiest(30.0, ABOVE, AT_REST, heavy)[0] == pytest.approx(
-        thriftiest(30.0, ABOVE, AT_REST, MOON)[0], abs=1e-6
+    assert least_propellant(30.0, ABOVE, AT_REST, heavy)[0] == pytest.approx(
+        least_propellant(30.0, ABOVE, AT_REST, MOON)[0], abs=1e-6
     )
 
 
@@ -188,8 +193,8 @@ def test_four_times_the_gravity_takes_half_the_time() -> None:
     strong = replace(
         MOON, gravity=4.0 * MOON.gravity, thrust=(280.0, 1080.0), descent_speed=2.0 * 0.5
     )
-    points, cost = thriftiest(30.0, ABOVE, np.array([-2.0, 1.0, -3.0]), MOON)
-    faster, less = thriftiest(15.0, ABOVE, np.array([-4.0, 2.0, -6.0]), strong)
+    points, cost = least_propellant(30.0, ABOVE, np.array([-2.0, 1.0, -3.0]), MOON)
+    faster, less = least_propellant(15.0, ABOVE, np.array([-4.0, 2.0, -6.0]), strong)
     assert faster == pytest.approx(points, abs=1e-6)
     assert less == pytest.approx(0.5 * cost)
 
@@ -198,8 +203,8 @@ def test_a_start_elsewhere_around_the_site_turns_the_plan_with_it() -> None:
     c, s = np.cos(2.0), np.sin(2.0)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     velocity = np.array([-2.0, 1.0, -3.0])
-    points = thriftiest(30.0, ABOVE, velocity, MOON)[0]
-    turned = thriftiest(30.0, turn @ ABOVE, turn @ velocity, MOON)[0]
+    points = least_propellant(30.0, ABOVE, velocity, MOON)[0]
+    turned = least_propellant(30.0, turn @ ABOVE, turn @ velocity, MOON)[0]
     assert turned == pytest.approx(points @ turn.T, abs=1e-3)
 
 

@@ -9,7 +9,7 @@ from lander_oracle import MOON_RADIUS, MU, fly
 from mjspace.controllers.landing.descent import SineDescent
 from mjspace.controllers.landing.guidance import BezierDescent
 from mjspace.controllers.landing.lander_estimator import EstimatedStructure, EstimatedVectoring
-from mjspace.controllers.landing.lander_filter import Belief, Navigation
+from mjspace.controllers.landing.lander_filter import FilterState, Navigation
 
 from mjspace import attitude as att
 from mjspace.contract import Array, Measurement
@@ -68,33 +68,38 @@ def descent(source: Any, rows: int) -> Iterator[Measurement]:
         yield Measurement(q[None], w[None], np.zeros((1, 0)), position=p[None], velocity=v[None])
 
 
-def errors(belief: Belief, truth: Measurement, sensors: Sensors) -> Array:
-    """Return truth less belief, in the filter's order, (n, 15)."""
-    turn = att.multiply(att.conjugate(belief.believed_attitude), truth.attitude)
+def errors(estimate: FilterState, truth: Measurement, sensors: Sensors) -> Array:
+    """Return truth less estimate, in the filter's order, (n, 15)."""
+    turn = att.multiply(att.conjugate(estimate.believed_attitude), truth.attitude)
     biases = np.concatenate([sensors.force_bias, sensors.gyro_bias], axis=1)
-    parts = [truth.position - belief.believed_position, truth.velocity - belief.believed_velocity]
-    return np.concatenate([*parts, att.to_rotation_vector(turn), biases - belief.believed_bias], 1)
+    parts = [
+        truth.position - estimate.believed_position,
+        truth.velocity - estimate.believed_velocity,
+    ]
+    return np.concatenate(
+        [*parts, att.to_rotation_vector(turn), biases - estimate.believed_bias], 1
+    )
 
 
-def flown(navigation: Navigation, rows: int, seed: int = 0) -> tuple[Array, Array, Belief]:
-    """Return the normalized squares of the errors (checks, n), the last errors, the belief."""
-    sensors, belief, squares = Sensors(FILTER, COUNT, seed), None, []
+def flown(navigation: Navigation, rows: int, seed: int = 0) -> tuple[Array, Array, FilterState]:
+    """Return the normalized squares of the errors (checks, n), the last errors, the estimate."""
+    sensors, estimate, squares = Sensors(FILTER, COUNT, seed), None, []
     for k, truth in enumerate(descent(BezierDescent(), rows)):
         seen = sensors(truth)
-        belief = navigation.navigate(belief or navigation.fix(seen), seen)
+        estimate = navigation.navigate(estimate or navigation.fix(seen), seen)
         if k % 40 == 39:
-            e = errors(belief, truth, sensors)
-            squares.append(np.einsum("ni,nij,nj->n", e, np.linalg.inv(belief.covariance), e))
-    assert belief is not None
-    return np.array(squares), e, belief
+            e = errors(estimate, truth, sensors)
+            squares.append(np.einsum("ni,nij,nj->n", e, np.linalg.inv(estimate.covariance), e))
+    assert estimate is not None
+    return np.array(squares), e, estimate
 
 
-def test_its_errors_are_as_large_as_it_believes() -> None:
-    squares, last, belief = flown(FILTER, 800)
+def test_its_errors_are_as_large_as_its_covariance() -> None:
+    squares, last, estimate = flown(FILTER, 800)
     # A mean of 15 for 15 states; of 40 flights within 2.2 at 99 % (chi-square). Nonlinearity, of
     # yaw at 50 m/s above all, adds up to 2: 13.9 to 17.2 measured.
     assert np.all(np.abs(squares.mean(axis=1) - 15.5) < 2.5)
-    sigma = np.sqrt(np.diagonal(belief.covariance, axis1=1, axis2=2)).mean(axis=0)
+    sigma = np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2)).mean(axis=0)
     assert sigma[2] < 0.06  # an altimeter of 0.5 m
     assert sigma[5] < 0.01  # a velocimeter of 0.05 m/s
     assert np.all(sigma[6:8] < 0.01)  # of a fix of 0.01 rad
@@ -129,11 +134,11 @@ def test_held_readings_count_once() -> None:
     sensors = Sensors(FILTER, 1, 4)
     seen = sensors(next(descent(SineDescent(), 1)))
     still = seen._replace(specific_force=np.zeros((1, 3)))
-    belief = FILTER.navigate(FILTER.fix(still), still)
-    later = FILTER.navigate(belief, still)
-    assert later.covariance[0, 2, 2] > belief.covariance[0, 2, 2]
-    fresh = FILTER.navigate(belief, still._replace(altitude=still.altitude + 0.1))
-    assert fresh.covariance[0, 2, 2] < belief.covariance[0, 2, 2]
+    estimate = FILTER.navigate(FILTER.fix(still), still)
+    later = FILTER.navigate(estimate, still)
+    assert later.covariance[0, 2, 2] > estimate.covariance[0, 2, 2]
+    fresh = FILTER.navigate(estimate, still._replace(altitude=still.altitude + 0.1))
+    assert fresh.covariance[0, 2, 2] < estimate.covariance[0, 2, 2]
 
 
 @pytest.mark.parametrize(
@@ -148,7 +153,7 @@ def test_held_readings_count_once() -> None:
     ],
     ids=["vectoring", "O3"],
 )
-def test_it_lands_on_what_it_believes(law: Any, source: Any, duration: float) -> None:
+def test_it_lands_on_its_estimates(law: Any, source: Any, duration: float) -> None:
     sense = Sensors(law, 1, 5)
     flight = fly(law, source, duration=duration, period=PERIOD, ground=0.0, sense=sense)
     assert -flight.velocity[-1, 2] < 0.65

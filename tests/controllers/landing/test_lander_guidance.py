@@ -11,7 +11,7 @@ from mjspace.controllers.landing.descent import SineDescent, powered
 from mjspace.controllers.landing.guidance import BezierDescent
 from mjspace.controllers.landing.lander_vectoring import ThrustVectoring
 
-LAW = ThrustVectoring(0.02)
+LAW = ThrustVectoring(control_period=0.02)
 LAGS = {"thrust_lag": 0.1, "gimbal_lag": 0.05, "gimbal_rate": np.radians(20.0)}
 
 

@@ -52,7 +52,7 @@ def test_slopes(seed: int) -> None:
 
 def test_vectoring_gets_the_angular_acceleration_that_it_asks_for() -> None:
     """On a spinning vehicle, so that the gyroscopic torque of 0.6 N m counts."""
-    law, wanted = ThrustVectoring(0.02), BezierDescent().at(np.array([30.0]))
+    law, wanted = ThrustVectoring(control_period=0.02), BezierDescent().at(np.array([30.0]))
     now = Trajectory(*(part[0] for part in wanted))
     tilt = att.from_rotation_vector(np.array([0.05, -0.02, 0.3]))
     q, w = att.multiply(now.attitude, tilt), np.array([0.05, -0.04, 0.8])
@@ -74,7 +74,10 @@ def test_vectoring_gets_the_angular_acceleration_that_it_asks_for() -> None:
 
 @pytest.mark.parametrize("error", [-200.0, 200.0])
 def test_vectoring_asks_for_no_more_than_its_limit(error: float) -> None:
-    law, wanted = ThrustVectoring(0.02), SineDescent(azimuth=0.0).at(np.array([200.0]))
+    law, wanted = (
+        ThrustVectoring(control_period=0.02),
+        SineDescent(azimuth=0.0).at(np.array([200.0])),
+    )
     now = Trajectory(*(part[0] for part in wanted))
     upright, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     place = now.position + np.array([0.0, 0.0, error])

@@ -123,10 +123,10 @@ def test_the_table_as_flown_has_every_gain_of_every_law() -> None:
         ({"law": {"kind": "coast:Coat"}}, r"phases.0.law: 'coast' has no 'Coat': did you mean 'C"),
         ({"law": {"kind": "quaternion_feedback:RateDamping", "rate_gian": 1}}, "phases.0.law: rat"),
         ({"law": {"kind": "own.py:Law"}}, "phases.0.law: own.py:Law: a law within another comes"),
-        ({"until": {"signal": "rat", "below": 1}}, "phases.0: until.signal: no 'rat' is measured"),
+        ({"until": {"signal": "rat", "below": 1}}, "phases.0: until.signal: got 'rat', should be"),
         ({"until": {"signal": "rate"}}, "a signal and below or above go together"),
-        ({"until": None}, "phases.0: 'damp' never ends: give it an until"),
-        ({"name": "wait"}, "phases: wanted one or more, with names of their own"),
+        ({"until": None}, "phases.0: 'damp' would never end: it needs an until"),
+        ({"name": "wait"}, "phases: got .*, should be one or more, with different names"),
         ({"nmae": "damp"}, "phases.0: .*nmae"),
     ],
 )

@@ -91,5 +91,5 @@ def test_a_motor_gets_the_same_bits_alone_and_in_a_batch() -> None:
 
 
 def test_a_bandwidth_of_nothing_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"tracking_bandwidth is -1\.0 rad/s"):
+    with pytest.raises(ValueError, match=r"tracking_bandwidth: got -1\.0 rad/s"):
         SpeedObserver(P, R, L, KM, STEP, tracking_bandwidth=-1.0)
