@@ -17,11 +17,11 @@ def with_declared_events(
 ) -> tuple[Block, Array]:
     """Return the block with an event for each entry, and who is inside at its end.
 
-    ``before`` and what is returned, (N, events), say of each vehicle whether it is inside; one that
-    begins inside has entered, and a value that is no number never is.
+    ``before`` and what is returned, (N, events), are True for each vehicle that is inside. One that
+    begins inside has entered; NaN is never inside.
 
     Raises:
-        InputError: an event is of, or shows, no signal of this flight, with the near names.
+        InputError: an event names a signal that this flight does not have, with the near names.
     """
     happened: list[Event] = []
     after = before.copy()

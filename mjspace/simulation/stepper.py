@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
+from mjspace import attitude
 from mjspace.contract import Array, Measurement
 from mjspace.environment import install
 from mjspace.errors import FlightError, InputError
@@ -50,6 +51,8 @@ class Stepper:
         if start.model:
             self.batch.set_const()
         self._sensordata = self.batch.bind("sensordata")
+        bus = assembly.vehicle.model.body("bus").id
+        self._on_bus = self.batch.bind("xfrc_applied")[:, bus]  # force and torque, inertial axes
         self.layout = StateLayout(assembly)
         self._suite, self._sensors = assembly.sensors(members), start.sensors
         self.memory = start.actuators
@@ -87,7 +90,7 @@ class Stepper:
             InputError: a fault's signal is not known.
             mujoco.batch.SimulationError: MuJoCo raised an error.
         """
-        instant = None
+        instant: Any = None
         if self.effects:
             instant = Instant(
                 period.time,
@@ -103,14 +106,15 @@ class Stepper:
         period.applied, period.saturated = self._drive(
             period.time, period.command, period.measurement, period.truth, instant
         )
+        period.wrench = None
         if self.effects:
-            self._each_effect("before_step", instant)
+            period.wrench = self._prepare_step(instant)
         # Derived fields lag the state by one step: this step computes those of now.
         if flown:
             self.batch.step()
         else:
             self.batch.forward()
-        period.wrench, period.sensordata = self._wrench(), self._sensordata.copy()
+        period.sensordata = self._sensordata.copy()
         if flown and self.effects:
             self._each_effect("after_step", instant)
 
@@ -130,7 +134,7 @@ class Stepper:
                     now, _, truth, measurement, *_ = instant
                     _, saturated = self._drive(now, period.command, measurement, truth, instant)
                     np.maximum(period.saturated, saturated, out=period.saturated)
-                self._each_effect("before_step", instant)
+                self._prepare_step(instant)
                 self.batch.step()
                 self._each_effect("after_step", instant)
                 step += 1
@@ -198,10 +202,13 @@ class Stepper:
             except Exception as error:
                 raise failure(effect.name, error) from error
 
-    def _wrench(self) -> Array | None:
-        """Return the sum of what the step effects apply to the bus; None where none does."""
-        total = None
-        for effect in self.effects:
-            if effect.wrench is not None:
-                total = effect.wrench if total is None else total + effect.wrench
+    def _prepare_step(self, instant: Instant) -> Array | None:
+        """Let the effects act for the step that begins; apply and return the sum of wrenches."""
+        self._each_effect("before_step", instant)
+        wrenches = [effect.wrench for effect in self.effects if effect.wrench is not None]
+        if not wrenches:
+            return None
+        total: Array = sum(wrenches[1:], start=wrenches[0])
+        self._on_bus[:, :3] = total[:, :3]
+        self._on_bus[:, 3:] = attitude.rotate(instant.truth.attitude, total[:, 3:])
         return total

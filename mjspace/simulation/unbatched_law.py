@@ -1,4 +1,4 @@
-"""Flying a law that knows nothing of batches: one vehicle at a time, stacked again."""
+"""Flying a law written for one vehicle: each vehicle in turn, with results stacked."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -53,8 +53,15 @@ def _stack(name: str, tuples: Sequence[Any]) -> Any:
     """Return the named tuples as one, a vehicle axis before each field; None is an empty tuple.
 
     Raises:
-        FlightError: a field is not numeric, or differs in shape between vehicles.
+        FlightError: a field is not numeric, or fields or shapes differ between vehicles.
     """
+    names = [getattr(one, "_fields", ()) for one in tuples]
+    for other in names[1:]:
+        if other != names[0]:
+            raise FlightError(
+                f"the law's {name} has the fields {list(names[0])} for one vehicle and "
+                f"{list(other)} for another: it must return the same for all"
+            )
     if not tuples[0]:
         return ()
     fields = []

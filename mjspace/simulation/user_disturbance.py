@@ -4,7 +4,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from mjspace import attitude
 from mjspace.contract import Array, Truth
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
@@ -26,26 +25,18 @@ class UserDisturbance(StepEffect):
         return None if assembly.disturbance is None else cls(assembly, layout)
 
     def __init__(self, assembly: Assembly, layout: StateLayout) -> None:
-        """Keep what the disturbance and its surroundings need."""
+        """Keep the disturbance, and the layout for its surroundings."""
         self._disturbance: Any = assembly.disturbance
-        self._layout, self._bus = layout, assembly.vehicle.model.body("bus").id
-        self._applied: Any = None
-
-    def bind(self, batch: Any) -> None:
-        """Take MuJoCo's force and torque on the bus, inertial axes, (N, 6)."""
-        self._applied = batch.bind("xfrc_applied")[:, self._bus]
+        self._layout = layout
 
     def before_step(self, memory: State, instant: Instant) -> State:
-        """Apply the disturbance of ``instant`` for the step that begins.
+        """Evaluate the disturbance at ``instant`` for the step that begins.
 
         Raises:
             FlightError: the disturbance raised, or returned anything but a force and a torque.
         """
         known = read_only(self._layout.with_surroundings(instant.physics, instant.truth))
-        wrench = np.array([self._of_one(instant.time, one) for one in map(Truth, *known)])
-        self._applied[:, :3] = wrench[:, :3]
-        self._applied[:, 3:] = attitude.rotate(instant.truth.attitude, wrench[:, 3:])
-        self.wrench = wrench
+        self.wrench = np.array([self._of_one(instant.time, one) for one in map(Truth, *known)])
         return memory
 
     def _of_one(self, now: float, truth: Truth) -> Array:

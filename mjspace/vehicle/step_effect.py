@@ -1,4 +1,4 @@
-"""Step effects: what acts on the vehicles in flight besides the law's command to the actuators."""
+"""Step effects: what acts on the vehicles in flight besides actuators and environment."""
 
 from abc import ABC
 from typing import Any, ClassVar, NamedTuple
@@ -54,8 +54,9 @@ class StepEffect(ABC):
     needs_truth: ClassVar[bool] = False
     """Whether it needs the whole truth in every integration step, and not turning alone."""
     wrench: Array | None = None
-    """Force [N], inertial axes, and torque [N m], body axes, that it applies to the bus in the step
-    that ``before_step`` has prepared, (N, 6): added to /disturbance; None for none."""
+    """Force [N], inertial axes, and torque [N m], body axes, on the bus during the step that
+    ``before_step`` has prepared, (N, 6). Those of all effects are added up, applied and logged in
+    /disturbance. None for an effect that never applies any."""
 
     def bind(self, batch: Any) -> None:  # noqa: B027
         """Take from the flight's ``mujoco.batch.Batch`` what is needed to act on it."""

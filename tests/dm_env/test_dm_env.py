@@ -18,6 +18,7 @@ pytest.importorskip("dm_control")
 from dm_env import StepType, TimeStep, test_utils
 
 from mjspace import dm_env
+from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Measurement
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load, scenario_names
@@ -32,6 +33,7 @@ pytestmark = [
     for kind in (UnphysicalInertiaWarning, ModelWarning)
 ]
 
+A, INF = np.radians(20.0), np.inf
 SHORT = "duration=0.048"  # a whole number of all control periods here
 NOISY = [
     "sensors.rate.noise_std=0.01",
@@ -249,6 +251,65 @@ def test_the_action_is_bounded_by_what_the_wheels_give() -> None:
     np.testing.assert_array_equal(environment.physics.control(), np.full(4, -5.0))
     free = at_rest().action_spec()
     assert free.maximum == pytest.approx(np.full(3, 2734.324), rel=1e-6)  # 100 x 27.34324 kg m^2
+
+
+@pytest.mark.parametrize(
+    ("scenario", "label", "least", "largest"),
+    [
+        ("lander", "thrust [N]", [0, -A, -A], [320, A, A]),  # the throttle, both gimbals by 20 deg
+        ("b-dot", "dipole[0] [A m^2]", [-5] * 3, [5] * 3),
+        ("cmg-slew", "gimbal_rate[0] [rad/s]", [-2.5] * 4, [2.5] * 4),
+        ("rcs-schmitt", "on_time[0] [s]", [0] * 12, [1e-3] * 12),
+        ("dgvscmg-tracking", "voltage[0, 0] [V]", [-INF] * 4 + [-400] * 2, [INF] * 4 + [400] * 2),
+    ],
+)
+def test_the_action_has_the_fields_units_and_limits_of_the_actuators(
+    scenario: str, label: str, least: list[float], largest: list[float]
+) -> None:
+    spec = dm_env.load(scenario).action_spec()
+    assert spec.name.split("\t")[0] == label
+    np.testing.assert_allclose(spec.minimum, least, rtol=1e-6)
+    np.testing.assert_allclose(spec.maximum, largest, rtol=1e-6)
+
+
+def test_an_action_of_another_length_is_refused() -> None:
+    environment = dm_env.load("lander", ["duration=0.2"])
+    environment.reset()
+    with pytest.raises(ValueError, match=r"has shape \(4,\): it must be \(3,\), of thrust \[N\]"):
+        environment.step(np.zeros(4))
+
+
+def test_a_step_is_a_whole_control_period_under_a_command() -> None:
+    physics = dm_env.load("lander", ["duration=0.2"]).physics
+    with pytest.raises(ValueError, match="no command"):
+        physics.step()
+    with pytest.raises(ValueError, match="nstep is 3: a step is one control period, 10 integr"):
+        physics.step(3)
+
+
+def test_what_happens_in_a_period_is_known_and_the_masses_follow() -> None:
+    fault = "faults=[{motor='engine',kind='scaled',value=0.9,at=0.03}]"
+    environment = dm_env.load("lander", ["duration=0.2", fault])
+    physics = environment.physics
+    for _ in range(2):
+        environment.reset()
+        full = physics.named.model.body_mass["tank"]
+        environment.step(np.array([200.0, 0.0, 0.0]))
+        assert physics.events() == []
+        environment.step(np.array([200.0, 0.0, 0.0]))
+        assert [event[3] for event in physics.events()] == ["fault: engine is scaled"]
+        left = physics.truth().propellant[0]
+        # That of the middle of the last integration step of 2 ms, at 0.1 kg/s.
+        assert physics.named.model.body_mass["tank"] == pytest.approx(left, abs=2e-4)
+        assert full - left == pytest.approx(0.04 * 200.0 / (310.0 * STANDARD_GRAVITY), rel=0.5)
+
+
+def test_a_task_may_change_the_start() -> None:
+    environment = dm_env.load("detumble-wheels", ["duration=0.1", "checks=[]"])
+    physics = environment.physics
+    with physics.reset_context():
+        physics.data.qvel[3:6] = [0.5, 0.0, 0.0]
+    np.testing.assert_array_equal(physics.measurement().rate, [0.5, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(

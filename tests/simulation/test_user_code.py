@@ -460,3 +460,24 @@ def push(time, truth):
     radius, speed = (np.linalg.norm(rows, axis=1) for rows in (place, motion))
     np.testing.assert_allclose(speed**2, 3.986004418e14 * (2 / radius - 1 / 7e6), rtol=1e-12)
     np.testing.assert_allclose((place[2:] - place[:-2]) / 0.01, motion[1:-1], rtol=1e-6, atol=1e-5)
+
+
+def test_an_inner_loop_of_a_law_for_one_vehicle_is_refused(tmp_path: Path) -> None:
+    code = law(GOOD) + "\nLaw.inner = lambda self, s, t, command, m: (s, command)\n"
+    with pytest.raises(InputError, match="law: Law has an inner loop and is not batched: write it"):
+        assemble(*load(scenario(tmp_path, code)))
+
+
+def test_fields_that_differ_between_vehicles_are_named(tmp_path: Path) -> None:
+    code = (
+        law("return None, self.zero(m), Seen(m.rate) if self.first() else None")
+        + """
+def first(self):
+    self.calls = getattr(self, 'calls', 0) + 1
+    return self.calls % 2
+Law.first = first
+"""
+    )
+    built = assemble(*load(scenario(tmp_path, code)))
+    with pytest.raises(FlightError, match=r"the law's signals has the fields \['e'\] for one veh"):
+        list(fly(built, first_start(built, range(2)), range(2)))
