@@ -1,4 +1,4 @@
-"""Errors that are told in one line: bad input, a flight that cannot go on, no renderer."""
+"""Errors that are reported in one line: bad input, a flight that cannot go on, no renderer."""
 
 import difflib
 import sys
@@ -8,7 +8,7 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """Bad input: one line with which file or option, which key, what was found, what would do."""
+    """Bad input: one line with the file or option, the key, what was found, what would be right."""
 
 
 class FlightError(RuntimeError):
@@ -21,7 +21,7 @@ class NoRendererError(RuntimeError):
 
 @contextmanager
 def input_error_at(key: str) -> Iterator[None]:
-    """Turn what a part or a file of the user's raises into an InputError that names ``key``."""
+    """Turn a ValueError or an OSError of the block into an InputError that names ``key``."""
     try:
         yield
     except InputError:
@@ -40,5 +40,5 @@ def nearest(name: str, names: Any) -> str:
 
 
 def print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Show a warning as one line, in place of ``warnings.showwarning``."""
+    """Print a warning as one line, in place of ``warnings.showwarning``."""
     print(f"mjspace: warning: {message}", file=sys.stderr)

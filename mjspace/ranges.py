@@ -1,4 +1,4 @@
-"""Which numbers a declared parameter admits: a range for each of them, a form for the whole."""
+"""The numbers that a declared parameter admits: a range for each, a form for the whole array."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ ROUNDED = 1e-3
 
 @dataclass(frozen=True)
 class Range:
-    """An interval, open at infinity: ``at_most=inf`` admits infinity, which then is no limit."""
+    """An interval of finite numbers; ``at_most=inf`` admits infinity as well, for "no limit"."""
 
     above: float | None = None
     at_least: float | None = None
@@ -42,7 +42,7 @@ class Range:
         return inside & (value == np.rint(value)) if self.whole else inside
 
     def demand(self, value: float) -> str:
-        """Return in words what ``value``, which is outside, should be."""
+        """Return in words what ``value``, which is outside the range, should be."""
         words = {"greater than {:.6g}": self.above, "{:.6g} or more": self.at_least}
         words |= {"less than {:.6g}": self.below, "{:.6g} or less": self.at_most}
         ends = [w.format(v) for w, v in words.items() if v is not None and np.isfinite(v)]
@@ -65,8 +65,8 @@ def numbers(value: Any) -> _Array:
     """Return ``value``, a number, an array or nested lists, as an array of float64.
 
     Raises:
-        ValueError: something in it is no number (truth values and text are none), or the rows of a
-            list differ in length.
+        ValueError: something in it is not a number (a truth value, text), or the rows of a list
+            differ in length.
     """
     wrong = _not_a_number(value)
     if wrong is not None:
@@ -78,7 +78,7 @@ def numbers(value: Any) -> _Array:
 
 
 def _not_a_number(value: Any) -> Any:
-    """Return the first thing in nested lists that is no number; None if all are."""
+    """Return the first item of nested lists that is not a number; None if all are numbers."""
     if isinstance(value, list | tuple):
         return next((w for item in value if (w := _not_a_number(item)) is not None), None)
     array = np.asarray(value)
@@ -91,12 +91,12 @@ def refuse_unfit(
     *,
     of_each_vehicle: bool = False,
 ) -> None:
-    """Refuse ``gains`` that do not fit what is ``declared`` of them by ``contract.gain``.
+    """Refuse ``gains`` that do not fit their declarations by ``contract.gain``.
 
-    ``of_each_vehicle`` admits a leading axis more than declared.
+    ``of_each_vehicle`` admits one more leading axis than declared.
 
     Raises:
-        ValueError: the first that does not, with its name, what was found and what would be right.
+        ValueError: the first that does not fit, with its name, its value and what would be right.
     """
     sizes: dict[str, tuple[str, int]] = {}
     for name, value in gains.items():
@@ -183,4 +183,4 @@ FORMS: dict[str, Callable[[_Array], str]] = {
     "quaternion": _of_norm_one("the quaternion of an attitude"),
     "increasing": _increasing,
 }
-"""What is wrong with an array of that form; empty where nothing is."""
+"""By form, a function that says what is wrong with an array; empty text if nothing is."""

@@ -167,8 +167,8 @@ def _shape(annotation: Any) -> tuple[list[str], str, type]:
     if origin is Annotated:
         sizes, unit, scalar = _shape(parts[0])
         for mark in parts[1:]:
-            if isinstance(mark, Si) and mark.unit:
-                unit = mark.unit
+            if isinstance(mark, Si) and mark.si:
+                unit = mark.si
             limits = mark.metadata if isinstance(mark, FieldInfo) else [mark]
             for limit in limits:
                 if isinstance(limit, MaxLen):

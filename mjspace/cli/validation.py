@@ -47,9 +47,9 @@ def validate(
     from mjspace.validation.basilisk import compared
 
     with input_error_at("--only"):
-        wanted = suite.chosen(only)
+        chosen = suite.chosen(only)
     with progress_bar(1.0, "validating", count="") as progress:
-        results = suite.validate(wanted, quick=quick, progress=progress)
+        results = suite.validate(chosen, quick=quick, progress=progress)
     results = compared(results, basilisk)
     data, page = report.write(results, output_folder(out, "validate"))
     if as_json:

@@ -1,4 +1,4 @@
-"""How a message lies in the log: protobuf of fixed size, so that a NumPy record is its encoding.
+"""The bytes of a message in the log: protobuf of fixed size, which a NumPy record describes.
 
 A packed ``repeated double`` of known length has a constant tag and a constant length before its
 numbers. The bytes of every message of a topic are therefore one template, and its numbers are the
@@ -68,7 +68,7 @@ def doubles(fields: Fields) -> Layout:
     """Return the layout of a message with one array field for each name, numbered from 1.
 
     Raises:
-        ValueError: a name is no protobuf identifier, or is ``time``, which the reader adds.
+        ValueError: a name is not a protobuf identifier, or is ``time``, which the reader adds.
     """
     template, offsets = b"", []
     for number, (name, shape) in enumerate(fields.items(), start=1):

@@ -26,7 +26,7 @@ from mjspace.log.chunk import Part, encode, record_bytes, sealed
 MAGIC = b"\x89MCAP0\r\n"
 """What an MCAP file begins and ends with."""
 NAME = "mjspace"
-"""Of the metadata record, without which a file is no log of ours."""
+"""Of the metadata record that every log of mjspace has."""
 
 # Chunks that may wait for the disk; beyond them the flight waits, so that memory is flat.
 _IN_FLIGHT = 2
@@ -97,12 +97,12 @@ class LogFile:
         self._writing.append(self._thread.submit(self._write_chunk, parts, then))
 
     def flush(self) -> None:
-        """Wait until every chunk given so far is with the operating system."""
+        """Wait until every chunk so far has been handed to the operating system."""
         while self._writing:
             self._writing.popleft().result()
 
     def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
-        """Write a metadata record after every chunk given so far, unless the file is closed."""
+        """Write a metadata record after every chunk so far, unless the file is closed."""
         if self._file.closed:
             return
         self.flush()
@@ -130,14 +130,14 @@ class LogFile:
         then()
 
     def _count(self, index: ChunkIndex, counts: Mapping[int, int]) -> None:
-        seen = self._statistics
-        earlier = seen.message_start_time if seen.chunk_count else index.message_start_time
-        seen.message_start_time = min(earlier, index.message_start_time)
-        seen.chunk_count += 1
-        seen.message_count += sum(counts.values())
-        seen.message_end_time = max(seen.message_end_time, index.message_end_time)
+        total = self._statistics
+        earlier = total.message_start_time if total.chunk_count else index.message_start_time
+        total.message_start_time = min(earlier, index.message_start_time)
+        total.chunk_count += 1
+        total.message_count += sum(counts.values())
+        total.message_end_time = max(total.message_end_time, index.message_end_time)
         for channel, count in counts.items():
-            seen.channel_message_counts[channel] += count
+            total.channel_message_counts[channel] += count
 
     def _put(self, data: bytes) -> None:
         """Hand ``data`` to the operating system, all of it."""

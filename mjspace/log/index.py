@@ -49,7 +49,7 @@ def inventory(path: Path) -> Inventory:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no MCAP file, no log of mjspace, or damaged.
+        ValueError: it is not an MCAP file, not a log of mjspace, or damaged.
     """
     try:
         return _inventory(path)
@@ -62,7 +62,7 @@ def _inventory(path: Path) -> Inventory:
     ours = complete = False
     with path.open("rb", buffering=0) as file:
         if file.read(len(MAGIC)) != MAGIC:
-            raise ValueError(f"{path} is no MCAP file")
+            raise ValueError(f"{path} is not an MCAP file")
         stream = ReadDataStream(file)
         for opcode, position in _walk(file):
             if opcode == Opcode.MESSAGE_INDEX:
@@ -91,7 +91,7 @@ def _inventory(path: Path) -> Inventory:
                 file.seek(-len(MAGIC), io.SEEK_END)
                 complete = file.read() == MAGIC
     if not ours:
-        raise ValueError(f"{path} is an MCAP file, but no log of {NAME}: it has no such metadata")
+        raise ValueError(f"{path} is an MCAP file, but not a log of {NAME}")
     if not complete and found.chunks:
         found.chunks[-1] = found.chunks[-1]._replace(indexes=None)
     return found._replace(complete=complete)

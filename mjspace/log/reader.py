@@ -1,4 +1,4 @@
-"""The log as it is read: NumPy arrays by topic and field, one chunk in memory at a time."""
+"""Reading a log: NumPy arrays by topic and field, one chunk in memory at a time."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
@@ -22,8 +22,8 @@ class Log:
     """A flight's log, whole or cut short: every chunk that was written completely is there.
 
     Nothing stays open between calls. ``metadata``, ``complete`` (not cut short), ``topics`` (shapes
-    by periodic topic and field) and ``units`` (by topic and field, where one was given) are read at
-    once, everything else when it is asked for.
+    by periodic topic and field) and ``units`` (by topic and field, where one is declared) are read
+    at once, everything else when it is used.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -31,7 +31,7 @@ class Log:
 
         Raises:
             OSError: the file cannot be read.
-            ValueError: it is no MCAP file, or no log of mjspace.
+            ValueError: it is not an MCAP file, or not a log of mjspace.
         """
         self.path = Path(path)
         self._found = found = inventory(self.path)

@@ -1,4 +1,4 @@
-"""The log as it is written: blocks of control periods in, one MCAP file out."""
+"""Writing a log: blocks of control periods in, one MCAP file out."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -42,7 +42,7 @@ class LogWriter:
 
         Raises:
             OSError: the file cannot be written.
-            ValueError: a topic or a field that the log has no room for.
+            ValueError: a topic or a field that the log cannot hold.
         """
         schemas, declared = channels(topics, units)
         self._topics = {topic: dict(fields) for topic, fields in topics.items()}
@@ -78,8 +78,8 @@ class LogWriter:
             for field, shape in fields.items():
                 values = rows[topic][field]
                 if values.shape != (count, *shape):
-                    wanted = (count, *shape)
-                    raise ValueError(f"{topic}.{field}: shape {values.shape}, wanted {wanted}")
+                    right = (count, *shape)
+                    raise ValueError(f"{topic}.{field}: shape {values.shape}, should be {right}")
                 columns[field] = values
         if not self._count:
             self._pending = [*self._scene_at(int(stamps[0])), *self._pending]
@@ -117,7 +117,7 @@ class LogWriter:
         self._pending.append(message(self._channels["/events"], stamp, entry.SerializeToString()))
 
     def flush(self) -> None:
-        """Wait until everything given so far can be read from the file.
+        """Wait until everything logged so far can be read from the file.
 
         Raises:
             OSError: something could not be written.

@@ -9,7 +9,7 @@ from mjspace.scenario.scenario import Check
 from mjspace.signals import find_signal
 
 _NARROW = 0.3  # of the upper bound
-_SHORTEST = 0.05  # of the log: a bound on one instant, drawn so that it is seen
+_SHORTEST = 0.05  # of the log: length of a bound on one instant, to be visible
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from mjspace.signals import find_signal
 
 WIDTH, HEIGHT = 7.5, 6.0  # inches
 GROUPS = 6
-"""Of thrusters that fire together are told apart: those that do so longest."""
+"""Number of groups of thrusters with a color of their own: those that fire together longest."""
 _ARROWS = (0.12, 0.37, 0.62, 0.87)  # of the way
 
 

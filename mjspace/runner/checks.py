@@ -21,7 +21,7 @@ NO_CRASH = Check(name="no crash", signal="truth.crash", statistic="max", below=0
 
 @dataclass(frozen=True)
 class Verdict:
-    """A check and what the log showed."""
+    """A check and what was measured from the log."""
 
     check: Check
     measured: float
@@ -149,7 +149,7 @@ def _measure(log: Log, check: Check, start: float, end: float) -> tuple[int, flo
             values = np.abs(values)
         count += len(values)
         total += float(np.sum(values**2 if check.statistic == "rms" else values))
-        # max and min pass a value that is no number on: it must fail every bound
+        # max and min pass NaN on, which must fail every bound
         peak, least, last = (
             float(np.max([peak, values.max()])),
             float(np.min([least, values.min()])),
@@ -164,7 +164,7 @@ def _measure(log: Log, check: Check, start: float, end: float) -> tuple[int, flo
         "drift": peak,
         "min": least,
         "mean": total / count,
-        "rms": math.sqrt(abs(total / count)),  # squares are summed only where it is asked for
+        "rms": math.sqrt(abs(total / count)),  # of squares only where the statistic is rms
         "final": last,
     }[check.statistic]
     return count, measured / scale

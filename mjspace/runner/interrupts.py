@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a question that the loop asks, so that a flight ends with its log whole."""
+"""Ctrl-C and SIGTERM as a request that the flight polls, so that its log ends complete."""
 
 import signal
 from collections.abc import Iterator
@@ -10,12 +10,12 @@ from typing import Any
 
 @dataclass
 class Stop:
-    """Whether to stop, and why."""
+    """Whether the flight is to stop, and why."""
 
     signal: int = 0
 
     def __call__(self) -> bool:
-        """Return whether a signal has asked to stop."""
+        """Return whether a signal has been received."""
         return self.signal != 0
 
 

@@ -87,7 +87,7 @@ class Recorder:
         self._log.event(self.time, level, text)
 
     def flush(self) -> None:
-        """Wait until everything given so far can be read from the file."""
+        """Wait until everything logged so far can be read from the file."""
         self._log.flush()
 
     def __enter__(self) -> Self:

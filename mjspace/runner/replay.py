@@ -143,9 +143,9 @@ def _other_streams(log: Log, scenario: Scenario) -> str:
 def assembly_of(
     log: Log, law: Component | None = None, folder: Path = Path()
 ) -> Iterator[Assembly]:
-    """Give what flew in ``log``, or the same under another ``law``.
+    """Yield the assembly that flew in ``log``, or the same under another ``law``.
 
-    The scenario, the compiled model and the files of one's own all come from the log.
+    The scenario, the compiled model and the user's files all come from the log.
 
     Raises:
         InputError: the log lacks one of them, the law cannot be built, or another version packed
@@ -170,7 +170,7 @@ def assembly_of(
 
 
 def _unpack(log: Log, own: Path) -> None:
-    """Write the files of one's own that the log holds, ``law.py`` or ``law/helpers.py``."""
+    """Write the user's files that the log holds, ``law.py`` or ``law/helpers.py``."""
     for name in log.attachments:
         if name.partition("/")[0].removesuffix(".py") not in SOURCES:
             continue
@@ -182,14 +182,14 @@ def _unpack(log: Log, own: Path) -> None:
 
 
 def _without_signals_of_the_law(scenario: Scenario) -> Scenario:
-    """Return the scenario without what looks at the law's signals, which another need not have."""
+    """Return the scenario without checks and events of signals that another law may lack."""
 
     def is_free(*signals: str) -> bool:
         return not any(signal.startswith("law.") for signal in signals)
 
     events = [event for event in scenario.events if is_free(event.signal, *event.shows)]
-    told = {None, *(event.name for event in events)}
-    checks = [c for c in scenario.checks if is_free(c.signal) and {c.since, c.until} <= told]
+    kept = {None, *(event.name for event in events)}
+    checks = [c for c in scenario.checks if is_free(c.signal) and {c.since, c.until} <= kept]
     return scenario.model_copy(update={"events": events, "checks": checks})
 
 

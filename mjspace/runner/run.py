@@ -18,12 +18,12 @@ from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import shapes
 
 Progress = Callable[[float], None]
-"""Told the simulated time reached [s]."""
+"""A function that is called with the simulated time reached [s]."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a flight left behind."""
+    """The log of a flight and its verdicts."""
 
     path: Path
     """The log."""

@@ -16,7 +16,7 @@ from mjspace.scenario.loading import load
 
 @dataclass(frozen=True)
 class Outcome:
-    """What flying one scenario came to."""
+    """The outcome of flying one scenario."""
 
     name: str
     description: str
@@ -53,8 +53,8 @@ def fly(
     return [outcomes[place] for place in range(len(names))]
 
 
-def _flown(given: tuple[str, tuple[str, ...], Path]) -> Outcome:
-    name, overrides, out = given
+def _flown(call: tuple[str, tuple[str, ...], Path]) -> Outcome:
+    name, overrides, out = call
     scenario, _ = load(name, overrides)
     began = time.perf_counter()
     result = report.result_data(run.run(name, overrides=overrides, out=out))
@@ -80,8 +80,8 @@ def show(outcomes: Sequence[Outcome]) -> None:
     """Print the table; under it, what is wrong with each flight that did not pass."""
     console = Console()
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for column in ("scenario", "verdict", "checks", "time", "what it shows"):
-        table.add_column(column, no_wrap=column != "what it shows")
+    for column in ("scenario", "verdict", "checks", "time", "description"):
+        table.add_column(column, no_wrap=column != "description")
     for outcome in outcomes:
         checks = outcome.result["checks"]
         right = [check for check in checks if check["as_expected"]]

@@ -29,7 +29,9 @@ def each(
     warm_up(calls[0][0].__module__)
     workers = min(os.cpu_count() or 1, len(calls))
     with ProcessPoolExecutor(workers, _CONTEXT, initializer=_quiet) as pool:
-        futures = {pool.submit(call, given): index for index, (call, given) in enumerate(calls)}
+        futures = {
+            pool.submit(call, argument): index for index, (call, argument) in enumerate(calls)
+        }
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()

@@ -1,4 +1,4 @@
-"""From a name and a table of gains to a law or a reference: find the class, check, construct."""
+"""Construct a law or a reference from its name and gains: find the class, check, convert."""
 
 import dataclasses
 import functools
@@ -55,7 +55,7 @@ def construct(
     if "file" in gains:
         read = columns(folder / str(gains.pop("file")))
         if both := sorted(read.keys() & gains.keys()):
-            raise ValueError(f"{both[0]}: given both here and in the file: give it once")
+            raise ValueError(f"{both[0]}: stands both here and in the file: leave one out")
         gains |= read
     parameters = _parameters(kind)
     for name in gains:
@@ -175,7 +175,7 @@ def _refuse_unlike(name: str, value: Any, annotation: Any, kind: str) -> None:
         return
     kinds = (int, float) if annotation is float else annotation
     right = isinstance(value, kinds) and (annotation is bool or not isinstance(value, bool))
-    if not right or value != value:  # nan is no number
+    if not right or value != value:  # nan is not equal to itself
         raise ValueError(f"{name}: got {value!r}, should be {word[annotation]}")
 
 

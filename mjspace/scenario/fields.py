@@ -18,16 +18,14 @@ from pydantic import (
 from pydantic_core import core_schema
 
 from mjspace.ranges import FORMS, Form
-from mjspace.units import to_si
+from mjspace.units import Unit, to_si
 
 _IN_PEOPLES_UNITS = {"rad": "deg", "rad/s": "deg/s", "m": "km", "s": "min"}
 
 
 @dataclass(frozen=True)
-class Si:
-    """Marks a number, or a list of them, as held in one SI unit: quantity strings are converted."""
-
-    unit: str
+class Si(Unit):
+    """The SI unit of a scenario's number, or list of numbers: quantity strings are converted."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
@@ -38,25 +36,23 @@ class Si:
     def _validated(self, value: Any, inner: core_schema.ValidatorFunctionWrapHandler) -> Any:
         """Return the value in SI; one out of range is suspected to have been meant in degrees."""
         try:
-            return inner(to_si(value, self.unit))
+            return inner(to_si(value, self.si))
         except ValidationError as error:
             if isinstance(value, str | bool) or not isinstance(value, int | float):
                 raise
-            meant = f"{value:g} {_IN_PEOPLES_UNITS.get(self.unit, '')}"
+            meant = f"{value:g} {_IN_PEOPLES_UNITS.get(self.si, '')}"
             try:
-                inner(to_si(meant, self.unit))
+                inner(to_si(meant, self.si))
             except ValueError:
                 raise error from None
             wrong = error.errors()[0]["msg"].replace("Input should", "should")
-            raise ValueError(
-                f"got {value:g} {self.unit}, {wrong}: did you mean {meant!r}?"
-            ) from None
+            raise ValueError(f"got {value:g} {self.si}, {wrong}: did you mean {meant!r}?") from None
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """Add the unit, for the scenario reference."""
-        return {**handler(schema), "unit": self.unit}
+        return {**handler(schema), "unit": self.si}
 
 
 def of_form(form: Form) -> AfterValidator:

@@ -9,10 +9,10 @@ import numpy as np
 def columns(path: Path) -> dict[str, Any]:
     """Return a CSV file's columns by their header; ``q0, q1, ...`` become one array ``q``.
 
-    Empty lines and what follows a ``#`` are passed over, but for the header.
+    Empty lines and text after a ``#`` are ignored, except in the header.
 
     Raises:
-        ValueError: no such file, no header, rows of unequal length, or something that is no number,
+        ValueError: no such file, no header, rows of unequal length, or text that is not a number,
             with the file and the line.
     """
     try:

@@ -57,9 +57,9 @@ def assert_refused(command: Command, path: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "bad.mcap is no MCAP file"),
-        (b"just text", "bad.mcap is no MCAP file"),
-        (b"\x89MCAP0\r\n", "bad.mcap is an MCAP file, but no log of mjspace"),
+        (b"", "bad.mcap is not an MCAP file"),
+        (b"just text", "bad.mcap is not an MCAP file"),
+        (b"\x89MCAP0\r\n", "bad.mcap is an MCAP file, but not a log of mjspace"),
         # a schema record of two bytes, a message index before any chunk, a channel of garbage
         (b"\x89MCAP0\r\n\x03\x02" + bytes(9), "bad.mcap is damaged: a record in it cannot be"),
         (b"\x89MCAP0\r\n\x07\x08" + bytes(15), "bad.mcap is damaged: a record in it cannot be"),
