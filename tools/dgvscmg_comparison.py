@@ -89,11 +89,11 @@ class Flown:
         """Return the integral of a power [J], summed over motors."""
         return float(power.sum() * (self.time[1] - self.time[0]))
 
-    def given(self, motors: slice = slice(None)) -> float:
+    def delivered(self, motors: slice = slice(None)) -> float:
         """Return the work that motors do [J]."""
         return self.energy(np.maximum(self.power[:, motors], 0.0))
 
-    def back(self, motors: slice = slice(None)) -> float:
+    def absorbed(self, motors: slice = slice(None)) -> float:
         """Return the work that is done on motors [J]."""
         return self.energy(np.maximum(-self.power[:, motors], 0.0))
 
@@ -133,8 +133,8 @@ def table(flights: Sequence[Flown]) -> str:
         "torque of all motors, RMS [N m]": lambda f: f"{rms(np.linalg.norm(f.torque, axis=1)):.2f}",
         "fastest wheel [rad/s]": lambda f: f"{np.abs(f.speed).max():.0f}",
         "largest mechanical power of a motor [W]": lambda f: f"{np.abs(f.power).max():.0f}",
-        "work done by the motors [J]": lambda f: f"{f.given():.1f}",
-        "work done on the motors [J]": lambda f: f"{f.back():.1f}",
+        "work done by the motors [J]": lambda f: f"{f.delivered():.1f}",
+        "work done on the motors [J]": lambda f: f"{f.absorbed():.1f}",
         "copper loss [J]": lambda f: f"{f.energy(f.loss):.1f}",
         "supply, without regeneration [J]": lambda f: f"{f.supply[-1]:.0f}",
     }
@@ -178,11 +178,11 @@ def main(flown: Path, quiet: Path, wheels: Path, page: Path) -> None:
     text = PAGE.format(
         table=table(flights),
         figure=drawn.name,
-        ripple=flights[0].given() - calm.given(),
-        gimbals=calm.given(gimbals),
-        wheels=against.given(),
-        spin=calm.given(spin),
-        back=calm.back(spin),
+        ripple=flights[0].delivered() - calm.delivered(),
+        gimbals=calm.delivered(gimbals),
+        wheels=against.delivered(),
+        spin=calm.delivered(spin),
+        back=calm.absorbed(spin),
         slowest=calm.speed.min(),
         fastest=calm.speed.max(),
         km=motor.torque_constant,

@@ -25,7 +25,7 @@ HEAD = """# The scenario reference
 A scenario is a TOML file. This page is written by `python tools/scenario_reference.py` from the
 typed model that reads it. Unknown keys, wrong units and wrong shapes are refused with the file, the
 key and what would be right, and so is a number that is not finite or outside the range beside it.
-Numbers are SI; where a unit is given, a string with a unit does too: `"30 deg/s"`, `"5 mN m"`, `"2
+Numbers are SI; where a unit is stated, a string with a unit does too: `"30 deg/s"`, `"5 mN m"`, `"2
 min"`. `mjspace info NAME` shows a scenario with every default written out, and `--set key=value`
 overrides any key.
 
