@@ -1,4 +1,4 @@
-"""Mass properties: a rotor's inertia, and what the wheels leave of the vehicle's for the bus."""
+"""Mass properties: a rotor's, and those of the bus from the vehicle's less its wheels'."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -13,10 +13,10 @@ from mjspace.scenario.plant import PlantTable, Wheels
 
 
 class Inertial(NamedTuple):
-    """Where a body's mass is: MuJoCo's own fields."""
+    """Mass properties of a body, in MuJoCo's fields."""
 
     mass: float
-    """[kg]"""
+    """Mass [kg]."""
     ipos: Array
     """Centre of mass in the body's axes [m], shape (3,)."""
     inertia: Array
@@ -36,13 +36,13 @@ def rotor(wheels: Wheels) -> Inertial:
     """Return the mass properties of each rotor, its spin axis along z.
 
     Raises:
-        ValueError: no rotor has that transverse inertia, or so large a product of inertia.
+        ValueError: the transverse inertia or the product of inertia is impossible for a rotor.
     """
     axial, transverse = wheels.inertia, transverse_inertia(wheels)
     if 2.0 * transverse < axial:
         raise ValueError(
             f"plant.wheels.transverse_inertia: {transverse:g} kg m^2 is less than half the axial "
-            f"{axial:g} kg m^2: no rotor has that"
+            f"{axial:g} kg m^2, which is impossible for a rotor"
         )
     balanced = Inertial(
         wheels.mass,
@@ -58,12 +58,12 @@ def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Iner
     imbalance of its ``bearing``.
 
     Static imbalance is an offset of the mass across the axis, dynamic imbalance a product of
-    inertia between the axis and that offset's direction. The axial inertia stays, and so does the
-    transverse one, but for a rotor so flat that its mass has to reach along the axis to be askew.
+    inertia between the axis and that offset's direction. The axial inertia is kept, and so is the
+    transverse one, except for a rotor so flat that its mass has to extend along the axis.
 
     Raises:
-        ValueError: so large a product of inertia that it would change the transverse inertia by
-            more than a hundredth; ``key`` is the bearing's in the scenario.
+        ValueError: the product of inertia would change the transverse inertia by more than a
+            hundredth; ``key`` is the bearing's in the scenario.
     """
     largest = int(np.argmax(np.abs(axis)))
     across = np.eye(3)[(largest + 1) % 3]
@@ -74,7 +74,7 @@ def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Iner
         return body
     frame = np.stack([axis, across, np.cross(axis, across)])
     inertia = frame @ tensor(body.inertia, body.iquat) @ frame.T
-    # Second moments of the mass, which any body has that are positive semidefinite.
+    # Second moments of the mass: those of a real body are positive semidefinite.
     spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     spread[0, 1] = spread[1, 0] = spread[0, 1] - bearing.dynamic_imbalance
     need = spread[0, 1:] @ np.linalg.solve(spread[1:, 1:], spread[0, 1:])
@@ -82,8 +82,8 @@ def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Iner
     if need > allowed:
         most = bearing.dynamic_imbalance * np.sqrt(allowed / need)
         raise ValueError(
-            f"{key}.dynamic_imbalance: {bearing.dynamic_imbalance:g} kg m^2 is more than what "
-            f"turns there can have: {most:.3g} kg m^2"
+            f"{key}.dynamic_imbalance: {bearing.dynamic_imbalance:g} kg m^2 is above the "
+            f"largest possible of the rotating body, {most:.3g} kg m^2"
         )
     spread[0, 0] = max(spread[0, 0], need + 1e-9 * inertia[1, 1])  # rounding must not undo it
     askew = np.trace(spread) * np.eye(3) - spread
@@ -92,15 +92,15 @@ def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Iner
 
 
 def bus(table: PlantTable, own: Array) -> tuple[Inertial, Array]:
-    """Return the bus that balances the wheels, and the gyrostat inertia H of the whole.
+    """Return the mass properties of the bus, and the gyrostat inertia H of the whole vehicle.
 
     The bus's mass is shifted so that the vehicle's centre of mass is the body origin. H is the
     whole vehicle about it less the wheels' axial inertia, body axes, shape (3, 3): H = I_bus
     + sum Jt (1 - a a^T) + the parallel-axis terms of bus and wheels. ``own`` is the bus inertia
-    [kg m^2] of a table that gives none. Wheel imbalance, which turns, is left out of the balance.
+    [kg m^2] where the table sets none. Wheel imbalance, which rotates, is not balanced.
 
     Raises:
-        ValueError: the wheels take more than ``gyrostat_inertia`` has.
+        ValueError: the wheels have more inertia than ``gyrostat_inertia``.
     """
     wheels = table.wheels
     axes = unit_axes(wheels)
@@ -129,7 +129,7 @@ def principal(inertia: Array) -> tuple[Array, Array]:
 
 
 def own_inertia(body: Any) -> Array:
-    """Return the inertia matrix (3, 3) [kg m^2] that a body of an ``MjSpec`` has of itself."""
+    """Return the inertia matrix (3, 3) [kg m^2] that a body of an ``MjSpec`` states."""
     if np.isnan(body.fullinertia[0]):
         return tensor(body.inertia, body.iquat)
     xx, yy, zz, xy, xz, yz = body.fullinertia
@@ -137,7 +137,7 @@ def own_inertia(body: Any) -> Array:
 
 
 def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inertial:
-    """Return the bus that makes a vehicle of mass ``whole`` [kg] with ``others``.
+    """Return the bus: a vehicle of mass ``whole`` [kg] less the bodies ``others``.
 
     ``inertia`` (3, 3) [kg m^2] is the vehicle's about the body origin, its centre of mass.
 
@@ -156,8 +156,8 @@ def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inert
     if np.linalg.eigvalsh(own)[0] <= 0.0:
         eigenvalues = np.array2string(np.linalg.eigvalsh(own), precision=4)
         raise ValueError(
-            f"plant.vehicle_inertia leaves a bus with the eigenvalues {eigenvalues} kg m^2: more "
-            "inertia or less on the parts would do"
+            f"plant.vehicle_inertia leaves a bus with the eigenvalues {eigenvalues} kg m^2, which "
+            "should be positive: use more inertia, or less on the parts"
         )
     return Inertial(left, centre, *principal(own))
 
@@ -175,21 +175,24 @@ def transverse_inertia(wheels: Wheels) -> float:
 
 
 def _point(r: Array) -> Array:
-    """Return the inertia of a unit mass at ``r`` [m] about the origin."""
+    """Return the inertia matrix (3, 3) of a unit mass at ``r`` (3,) [m] about the origin."""
     result: Array = np.dot(r, r) * np.eye(3) - np.outer(r, r)
     return result
 
 
 def _too_much(inertia: Array, room: Array, across: Array, wheels: Wheels) -> str:
-    """Say what is left of ``room``, and the largest wheels that would fit into it."""
+    """Return the message with the bus inertia that remains, and the largest wheels that fit."""
     if np.linalg.eigvalsh(room)[0] <= 0.0:
-        cure = "lighter wheels or ones nearer to the centre of mass would"
+        cure = "lighter wheels, or wheels nearer to the centre of mass"
     else:
         fits = transverse_inertia(wheels) / eigh(across, room, eigvals_only=True)[-1]
         cure = (
-            f"a wheel inertia below {2.0 * fits:.4g} kg m^2 would"
+            f"a wheel inertia below {2.0 * fits:.4g} kg m^2"
             if wheels.transverse_inertia is None
-            else f"a transverse wheel inertia below {fits:.4g} kg m^2 would"
+            else f"a transverse wheel inertia below {fits:.4g} kg m^2"
         )
     left = np.array2string(np.linalg.eigvalsh(inertia), precision=4)
-    return f"plant.gyrostat_inertia leaves a bus with the eigenvalues {left} kg m^2: {cure} do"
+    return (
+        f"plant.gyrostat_inertia leaves a bus with the eigenvalues {left} kg m^2, which should be "
+        f"positive: use {cure}"
+    )

@@ -19,17 +19,17 @@ from mjspace.vehicle import composition, indices, mass_properties, model_checks
 
 
 class UnphysicalInertiaWarning(UserWarning):
-    """The bus flies with an inertia that no mass distribution has."""
+    """The inertia of the bus is impossible for a mass distribution, but simulated unchanged."""
 
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A compiled vehicle and what a law, an actuator and the log need to know of it."""
+    """A compiled vehicle with the properties that laws, actuators and the log need."""
 
     model: Any  # the ``mujoco.MjModel``
     inertia: Array
-    """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia,
-    body axes [kg m^2], shape (3, 3); wheel imbalance left out."""
+    """H of the papers: inertia of the whole vehicle about its centre of mass, less the wheels'
+    axial inertia, body axes [kg m^2], shape (3, 3); without wheel imbalance."""
     wheel_axes: Array
     """Unit spin axes, body axes, shape (n, 3)."""
     wheel_inertia: Array
@@ -47,11 +47,11 @@ class Vehicle:
     strut_qpos: Any
     """Index of each landing leg's strut in ``qpos``, shape (l,): positive where it is pressed."""
     motors: tuple[str, ...]
-    """Names of the hinges that motors turn, then of the thrusters, in the order of ``ctrl``."""
+    """Names of the hinges with motors, then of the thrusters, in the order of ``ctrl``."""
     torque_limit: float
-    """Largest motor torque [N m]; inf where there is none."""
+    """Largest motor torque [N m]; inf without a limit."""
     speed_limit: float
-    """Largest wheel speed relative to the bus [rad/s]; inf where there is none."""
+    """Largest wheel speed relative to the bus [rad/s]; inf without a limit."""
     momentum: slice
     """In ``sensordata``: total angular momentum about the centre of mass, inertial [N m s]."""
     kinetic: slice
@@ -61,14 +61,14 @@ class Vehicle:
 
 
 def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
-    """Return the vehicle that ``table`` describes; its state has ``userdata`` numbers of user data.
+    """Return the vehicle that ``table`` describes, with ``userdata`` numbers of user data.
 
     Raises:
-        ValueError: an unknown model or part, wheels that leave no inertia for the bus or that no
-            rotor can be, or what ``guards.check`` refuses.
+        ValueError: an unknown model or part, wheels that leave no inertia for the bus or are
+            impossible as rotors, or a finding of ``model_checks.check``.
 
     Warns:
-        UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown as given.
+        UnphysicalInertiaWarning: the bus inertia violates the triangle inequality.
     """
     spec = composition.compose(table)
     spec.option.timestep = rates.physics
@@ -100,7 +100,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
 
 
 def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
-    """Return ``vehicle`` on another compilation of it: the one that a log holds.
+    """Return ``vehicle`` with another compiled model of it, as from a log.
 
     Raises:
         KeyError: ``model`` lacks one of the vehicle's joints or sensors.
@@ -116,16 +116,16 @@ def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
 def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
     """Return (qpos, qvel), shapes (nq,) and (nv,), of the vehicle at time zero.
 
-    Wheel speeds for a wanted total momentum are solved with MuJoCo's own momentum matrix, so that
-    they hold for wheels anywhere in the bus; where more than three wheels can make it, the least.
+    Wheel speeds for a desired total momentum are solved with MuJoCo's momentum matrix, so that they
+    are right for wheels anywhere in the bus; with more than three wheels they have the least norm.
 
     Raises:
-        ValueError: not one speed for each wheel, a speed above the limit, a joint that is not
-            there, or a momentum that the wheels' axes cannot make.
+        ValueError: a wrong number of speeds, a speed above the limit, an unknown joint, or a
+            momentum that the wheels' axes do not span.
 
     Warns:
-        guards.ModelWarning: a step too long for imbalanced wheels at the speed limit or, where
-            there is none, at the initial speed.
+        model_checks.ModelWarning: a step too long for imbalanced wheels at the speed limit or,
+            without a limit, at the initial speed.
     """
     data = mujoco.MjData(vehicle.model)
     wheels = vehicle.wheel_dof
@@ -181,16 +181,17 @@ def from_bytes(data: bytes) -> Any:
 def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
     body, moments = spec.body("bus"), inertial.inertia
     body.mass, body.ipos, _, body.iquat = inertial
-    body.fullinertia = np.full(6, np.nan)  # not given: the principal moments are
+    body.fullinertia = np.full(6, np.nan)  # unset: the principal moments apply
     excess = moments[2] - moments[1] - moments[0]
-    # MuJoCo's compiler refuses what is not physical; its dynamics only need it positive.
+    # MuJoCo's compiler refuses unphysical inertias; its dynamics only need positive ones.
     body.inertia = moments if excess <= 0.0 else np.full(3, moments.mean())
     model = spec.compile()
     if excess > 0.0:
         eigenvalues = np.array2string(moments, precision=4)
         warnings.warn(
-            f"no mass distribution has the bus inertia's eigenvalues {eigenvalues} kg m^2: the "
-            f"largest exceeds the sum of the others by {excess:.4g}; flown as given",
+            f"the bus inertia's eigenvalues {eigenvalues} kg m^2 are impossible for a mass "
+            f"distribution: the largest exceeds the sum of the others by {excess:.4g}; they are "
+            "simulated unchanged",
             UnphysicalInertiaWarning,
             stacklevel=3,
         )
@@ -200,7 +201,7 @@ def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
 
 
 def _others(spec: Any) -> list[mass_properties.Inertial]:
-    """Return what else than the bus has mass, in the bus's axes, joints at rest."""
+    """Return the mass properties of all bodies but the bus, in the bus's axes, joints at rest."""
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -220,19 +221,19 @@ def _others(spec: Any) -> list[mass_properties.Inertial]:
 
 
 def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
-    """Return the wheel speeds [rad/s] for a total ``momentum`` [N m s], inertial axes."""
+    """Return the wheel speeds (n,) [rad/s] for a total ``momentum`` (3,) [N m s], inertial axes."""
     bus = vehicle.model.body("bus").id
     matrix = np.zeros((3, vehicle.model.nv))
     mujoco.mj_fwdPosition(vehicle.model, data)
     mujoco.mj_angmomMat(vehicle.model, data, matrix, bus)
     by_wheels = matrix[:, vehicle.wheel_dof]
-    wanted = momentum - matrix @ data.qvel
-    speeds: Array = np.linalg.lstsq(by_wheels, wanted, rcond=1e-10)[0]
-    missing = wanted - by_wheels @ speeds
-    if np.linalg.norm(missing) > 1e-9 * np.linalg.norm(wanted):
+    required = momentum - matrix @ data.qvel
+    speeds: Array = np.linalg.lstsq(by_wheels, required, rcond=1e-10)[0]
+    missing = required - by_wheels @ speeds
+    if np.linalg.norm(missing) > 1e-9 * np.linalg.norm(required):
         in_body = data.xmat[bus].reshape(3, 3).T @ missing
         raise ValueError(
             f"initial.momentum: the wheels' axes cannot make {in_body} N m s of it (body axes): "
-            f"give wheel_speed, or plant.wheels.axes that span it"
+            f"set wheel_speed instead, or plant.wheels.axes that span it"
         )
     return speeds
