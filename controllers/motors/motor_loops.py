@@ -233,8 +233,8 @@ def refuse_fast_poles(kep: Gain, kei: Gain, decay: Gain, period: float) -> None:
         fastest = np.max(np.abs(np.roots([1.0, r + p, i])))
         raise ValueError(
             f"current gains {p:g} 1/s and {i:g} 1/s^2 put a pole at {fastest:.2g} rad/s: a control "
-            f"period of {period:g} s is too long, it should be at most {2.0 / fastest:.1e} s (and the "
-            f"steps of RK4 at most {_RK4 / fastest:.1e} s); or use a gain of {0.3 / period:g} 1/s"
+            f"period of {period:g} s is too long, it should be at most {2.0 / fastest:.1e} s (and "
+            f"the steps of RK4 at most {_RK4 / fastest:.1e} s); or use {0.3 / period:g} 1/s"
         )
 
 
