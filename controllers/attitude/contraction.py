@@ -77,15 +77,27 @@ class AdaptiveSignals(NamedTuple):
     """Yf theta_hat less the filtered torque [N m], (..., 3)."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Contraction(Gains):
+    """Gains of every law of this module."""
+
+    batched: ClassVar[bool] = True
+
+    rate_gain: float = gain("N m s/rad", default=25.0, above=0.0)
+    """Kc, the same on each axis."""
+    attitude_gain: float = gain("1/s", default=25.0, above=0.0)
+    """lc: contraction rate of the attitude."""
+    torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
+    """Largest command on each axis."""
+
+
 @dataclass(frozen=True)
-class Ideal(Gains):
+class Ideal(_Contraction):
     """Known inertia: tau = H wd' - p x wd - Kc e, (3.6).
 
     The printed h = R^T hI needs a constant momentum. Here p = H w + sum a Jw (a.w + Omega) from the
     tachometers, which is equal on a torque-free vehicle and valid under any torque.
     """
-
-    batched: ClassVar[bool] = True
 
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
@@ -93,12 +105,6 @@ class Ideal(Gains):
     """Unit spin axes, body axes, one row for each wheel."""
     wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
     """Axial inertia of each wheel."""
-    rate_gain: float = gain("N m s/rad", default=25.0, above=0.0)
-    """Kc, the same on each axis."""
-    attitude_gain: float = gain("1/s", default=25.0, above=0.0)
-    """lc: contraction rate of the attitude."""
-    torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
-    """Largest command on each axis."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> IdealState:
         """Return the initial state, with the sign of q nearer to the reference."""
@@ -120,7 +126,7 @@ class Ideal(Gains):
 
 
 @dataclass(frozen=True)
-class Gradient(Gains):
+class Gradient(_Contraction):
     """Estimated inertia, by the gradient alone: tau = Y theta_hat - Kc e, theta_hat' = -ga Y^T e.
 
     Equations (4.2) and (4.21); ga is above zero, where the paper prints zero (erratum 19). The
@@ -128,18 +134,10 @@ class Gradient(Gains):
     period.
     """
 
-    batched: ClassVar[bool] = True
-
     control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
-    rate_gain: float = gain("N m s/rad", default=25.0, above=0.0)
-    """Kc, the same on each axis."""
-    attitude_gain: float = gain("1/s", default=25.0, above=0.0)
-    """lc: contraction rate of the attitude."""
     adaptation_gain: float = gain(default=1.0, above=0.0)
     """ga."""
-    torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
-    """Largest command on each axis."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> GradientState:
         """Return the initial state: estimates of zero, the sign of q nearer to the reference."""
@@ -161,7 +159,7 @@ class Gradient(Gains):
 
 
 @dataclass(frozen=True)
-class Adaptive(Gains):
+class Adaptive(_Contraction):
     """Estimated inertia and momentum: the composite law (4.2), (4.5)-(4.9).
 
     Corrected by erratum 15: ga Yf^T eps, and da ga Z. The estimate of hI assumes a constant total
@@ -171,14 +169,8 @@ class Adaptive(Gains):
     torque, so ``torque_limit`` must not exceed that of the actuators.
     """
 
-    batched: ClassVar[bool] = True
-
     control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
-    rate_gain: float = gain("N m s/rad", default=25.0, above=0.0)
-    """Kc, the same on each axis."""
-    attitude_gain: float = gain("1/s", default=25.0, above=0.0)
-    """lc: contraction rate of the attitude."""
     filter_bandwidth: float = gain("rad/s", default=2.0, above=0.0)
     """lF: of the filters that replace the unmeasured acceleration."""
     adaptation_coupling: float = gain(default=2.0, above=0.0)
@@ -187,8 +179,6 @@ class Adaptive(Gains):
     """ga."""
     forgetting: float = gain("1/s", default=0.1, at_least=0.0)
     """lf: forgetting rate of the information matrix."""
-    torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
-    """Largest command on each axis."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

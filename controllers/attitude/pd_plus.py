@@ -115,11 +115,8 @@ class Classical(Gains):
 
 
 @dataclass(frozen=True)
-class Modified(Gains):
-    """Modified PD+, (3.7): tau = M wr' - M w x wr - (1 + |sigma_e|^2) sigma_e / 2 - Kc s.
-
-    wr = wb - 2 lam sigma_e and s = w - wr: both errors vanish exponentially (Lemma 3.1.1).
-    """
+class _ModifiedGains(Gains):
+    """What the modified and the robust law share."""
 
     batched: ClassVar[bool] = True
 
@@ -133,6 +130,14 @@ class Modified(Gains):
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the empty state."""
         return State()
+
+
+@dataclass(frozen=True)
+class Modified(_ModifiedGains):
+    """Modified PD+, (3.7): tau = M wr' - M w x wr - (1 + |sigma_e|^2) sigma_e / 2 - Kc s.
+
+    wr = wb - 2 lam sigma_e and s = w - wr: both errors vanish exponentially (Lemma 3.1.1).
+    """
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
@@ -151,7 +156,7 @@ class Modified(Gains):
 
 
 @dataclass(frozen=True)
-class Robust(Gains):
+class Robust(_ModifiedGains):
     """Modified PD+ with compensation of a disturbance with a known bound, (3.18).
 
     The third part, (3.19), is a smoothed relay: its slope at s = 0 is tbar^2 / eps, by default
@@ -160,14 +165,6 @@ class Robust(Gains):
     2.63 times the ball printed in Corollary 3.2.1 (E25).
     """
 
-    batched: ClassVar[bool] = True
-
-    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
-    """M: of the rigid bus, about its centre of mass, body axes."""
-    attitude_gain: float = gain("1/s", default=1.0, above=0.0)
-    """lam: with s = 0, sigma_e vanishes at this rate."""
-    rate_gain: float = gain("N m s/rad", default=10.0, above=0.0)
-    """Kc, the same on each axis."""
     disturbance_bound: float = gain("N m", default=0.04, above=0.0)
     """tbar: largest norm of the disturbance; the thesis' reaches 0.0387 (E24)."""
     smoothing: float = gain("W", default=1e-7, above=0.0)
@@ -176,10 +173,6 @@ class Robust(Gains):
     """Unit spin axes of reaction wheels, body axes, one row for each; not in the thesis."""
     wheel_inertia: Array = gain("kg m^2", ("wheel",), default=(), at_least=0.0)
     """Axial inertia of each wheel, not contained in ``inertia``."""
-
-    def reset(self, measurement: Measurement, reference: Reference) -> State:
-        """Return the empty state."""
-        return State()
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference

@@ -1,7 +1,7 @@
 """MuJoCo against Basilisk: the same gimballed wheel on a free bus, at equal steps.
 
-Two engines that share no line of code, no formulation and no attitude parameters. Basilisk lives in
-an environment of its own, for its packages and ours need not agree.
+Two engines with independent code, formulation and attitude parameters. Basilisk runs in a separate
+Python environment, since its dependencies may conflict with ours.
 """
 
 import json
@@ -26,7 +26,7 @@ _BOUNDS: tuple[Bound, ...] = (
         "attitude",
         "rad",
         1e-10,
-        "both are RK4 at one step: what is left is rounding; 6e-14 measured",
+        "both are RK4 at one step: the difference is rounding; 6e-14 measured",
     ),
     Bound("rate", "rad/s", 1e-10, "as the attitude; 2e-15 measured"),
     Bound("gimbal angle", "rad", 1e-10, "as the attitude; 1e-13 measured"),
@@ -35,11 +35,11 @@ _BOUNDS: tuple[Bound, ...] = (
 
 
 class BasiliskMissingError(RuntimeError):
-    """No Basilisk where one was looked for; says what the interpreter said."""
+    """The interpreter has no Basilisk; the message has the interpreter's last line."""
 
 
 def compared(results: Results, python: str) -> Results:
-    """Return ``results`` with the comparison added, or with a remark that says why it is not."""
+    """Return ``results`` with the comparison, or with a remark on why it was not made."""
     if not python:
         remark = "Basilisk: not compared; --basilisk PYTHON names an interpreter that has bsk"
         return results.model_copy(update={"remarks": [*results.remarks, remark]})
@@ -89,10 +89,10 @@ def compare(python: str) -> Section:
 
 
 def describe(model: Any) -> dict[str, Any]:
-    """Return the vehicle as ``basilisk_flight`` reads it, from the compiled model.
+    """Return the vehicle of the compiled model as ``basilisk_flight`` reads it.
 
-    A free bus carries a chain of bodies, each on one hinge, undeflected at the start; body frames
-    are parallel to their parents'. SI units, everything in the body's own frame.
+    A free bus carries a chain of bodies, each on one hinge at angle zero; body frames are parallel
+    to their parents'. SI units, vectors and matrices in the body's own frame.
     """
     bodies = [_body(model, name) for name in ("bus", *HINGES)]
     chain = zip(bodies[1:], HINGES, HINGE_RATES, strict=True)
@@ -139,7 +139,7 @@ def _there(python: str) -> dict[str, Any]:
     except OSError as error:
         raise BasiliskMissingError(f"{python}: {error.strerror}") from error
     except subprocess.CalledProcessError as error:
-        said = error.stderr.strip().splitlines()
-        raise BasiliskMissingError(f"{python}: {said[-1] if said else 'no answer'}") from error
+        lines = error.stderr.strip().splitlines()
+        raise BasiliskMissingError(f"{python}: {lines[-1] if lines else 'no output'}") from error
     answer: dict[str, Any] = json.loads(done.stdout)
     return answer

@@ -1,7 +1,7 @@
 """Flies a chain of hinged bodies on a free bus in Basilisk: a script for an interpreter with bsk.
 
-Knows nothing of mjspace, which that interpreter need not have. Reads the vehicle as JSON from
-standard input (SI units; ``basilisk.describe`` says what) and writes how it moved as JSON.
+It does not import mjspace, which that interpreter need not have. It reads the vehicle as JSON from
+standard input (SI units, as ``basilisk.describe`` returns it) and writes the motion as JSON.
 """
 
 import json
@@ -15,7 +15,7 @@ from Basilisk.utilities import SimulationBaseClass, macros
 
 
 def fly(vehicle: dict[str, Any]) -> dict[str, Any]:
-    """Return time, attitude as MRP, rate, hinge angles and rates of the flight, RK4 throughout."""
+    """Return time, attitude as MRP, rate, hinge angles and rates of the flight by RK4, in SI."""
     simulation = SimulationBaseClass.SimBaseClass()
     simulation.SetProgressBar(False)
     step = macros.sec2nano(vehicle["step"])

@@ -1,4 +1,4 @@
-"""What a benchmark is: a flight of a small model, what it measures, and how far off it may be."""
+"""Benchmarks: a flight of a small model, its measured quantities, and their bounds."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -21,24 +21,24 @@ FAULTS: Mapping[Fault, str] = {
 
 @dataclass(frozen=True)
 class Conditions:
-    """How a benchmark is flown."""
+    """Conditions of one flight of a benchmark."""
 
     step: float  # s
     integrator: Integrator = "RK4"
     fault: Fault | None = None
     short: bool = False
-    """Fly no longer than it takes to show a fault or an order; the same bounds hold."""
+    """Fly only as long as a fault or an order needs to be measured; the same bounds hold."""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """A quantity that a benchmark measures, and how far from its target it may be."""
+    """A quantity that a benchmark measures, with its target and allowed deviation."""
 
     quantity: str
     unit: str
     allowed: float
     reason: str
-    """Why this bound and no other, with the value measured when it was set."""
+    """The reason for this bound, with the value measured when it was set."""
     target: float = 0.0
 
     def admits(self, measured: float) -> bool:
@@ -48,17 +48,17 @@ class Bound:
 
 @dataclass(frozen=True)
 class Order:
-    """Where RK4's order of convergence is observed: the least of ``bounds`` that fall with it."""
+    """The errors and steps from which RK4's order of convergence is observed."""
 
     quantities: tuple[str, ...]
     """Errors among the benchmark's bounds."""
     steps: tuple[float, ...]
-    """Steps [s], each half of the one before, between rounding and the limit of stability."""
+    """Steps [s], each half of the one before, between rounding and the stability limit."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One line of a picture, or dots."""
+    """One line, or dots, of a figure."""
 
     label: str
     x: Array
@@ -68,7 +68,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Picture:
-    """What a person should see of the motion: the truth and MuJoCo's flight, usually."""
+    """Figure of the motion: usually the exact solution and MuJoCo's flight."""
 
     x_label: str
     y_label: str
@@ -76,9 +76,9 @@ class Picture:
 
     @staticmethod
     def of(y_label: str, time: Array, names: str, exact: Array, measured: Array) -> "Picture":
-        """Draw columns over time [s], lines for the truth and dots for MuJoCo.
+        """Return a figure over time [s], with lines for the exact solution and dots for MuJoCo.
 
-        ``names`` are separated by blanks, one for each column of ``exact`` and ``measured``.
+        ``names`` are separated by blanks, one for each column of ``exact`` and ``measured`` (n, k).
         """
         curves = []
         for name, truth, flown in zip(names.split(), exact.T, measured.T, strict=True):
@@ -88,30 +88,30 @@ class Picture:
 
 @dataclass(frozen=True)
 class Readings:
-    """What one flight measured."""
+    """Measured values of one flight."""
 
     values: Mapping[str, float]
-    """By the names of the benchmark's bounds."""
+    """Values by the names of the benchmark's bounds."""
     motion: Picture
     error: Curve
-    """The error that grows with the flight; its label says what it is, with the unit."""
+    """Error over time; the label has its name and unit."""
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """A flight whose end is known."""
+    """A flight whose exact result is known."""
 
     name: str
     title: str
     shows: str
-    """What a user may trust MuJoCo with when this passes; and what the naive do wrong."""
+    """What the benchmark proves about MuJoCo when it passes, and common mistakes it detects."""
     source: str
-    """Of the truth: author, title, year, section or equation."""
+    """Source of the exact result: author, title, year, section or equation."""
     step: float  # s
     bounds: tuple[Bound, ...]
     fly: Callable[[Conditions], Readings]
     catches: Mapping[Fault, str]
-    """The faults that must break a bound, and what each is here ('' where FAULTS says it all)."""
+    """The faults that must violate a bound, each with its meaning here ('' for that of FAULTS)."""
     order: Order | None = None
     others: tuple[Integrator, ...] = field(default=("Euler", "implicit", "implicitfast"))
-    """Integrators shown beside RK4 as the warning they are."""
+    """Integrators that are flown for comparison with RK4."""

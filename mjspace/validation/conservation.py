@@ -1,4 +1,4 @@
-"""What is conserved while a model flies free, and of what that says nothing."""
+"""Conservation of momentum and energy of a model in free flight."""
 
 import copy
 from collections.abc import Iterator
@@ -12,23 +12,23 @@ from mjspace.validation import meter, model_ties, stand
 from mjspace.validation.benchmark import Bound, Conditions
 from mjspace.validation.results import Row
 
-MINUTE = 60.0  # s, that conservation is watched and steps are advised for
+MINUTE = 60.0  # s, for which conservation is observed and steps are advised
 MOST_STEPS = 600_000
-"""Steps that conservation is watched for at the most, of a lone body: a step of 1 ms takes 60,000.
-A model of n dofs gets 1 + n / 10 times fewer."""
+"""Largest number of steps of the flight of a single body (60,000 for a minute at 1 ms); a model of
+n dofs gets 1 + n / 10 times fewer."""
 CONSERVED = 1e-8
-"""Relative drift in a minute that is allowed: a thousandth of what a star tracker sees."""
+"""Allowed relative drift in a minute: a thousandth of a star tracker's resolution."""
 
 
 class Bus(NamedTuple):
-    """What drifts are compared with."""
+    """Momentum and energy of the bus, the scale of drifts."""
 
     momentum: float  # N m s
     energy: float  # J
 
 
 class Flight:
-    """The flight that shows conservation, and what of it can be judged."""
+    """A free flight, with the conserved quantities that can be judged."""
 
     def __init__(self, model: Any, start: Any) -> None:
         """Fly ``model`` from ``start`` (``MjData``)."""
@@ -47,7 +47,7 @@ class Flight:
         )
 
     def _reaches_stops(self) -> bool:
-        """Tell whether a joint or tendon came to its stop, which else changes no bit."""
+        """Tell whether a joint or tendon reached its stop: without stops the flight differs."""
         if not model_ties.has_stops(self._model):
             return False
         unstopped = copy.copy(self._model)
@@ -55,25 +55,25 @@ class Flight:
         return not np.array_equal(self._fly(unstopped).qpos[-1], self._record.qpos[-1])
 
     def broken_off(self) -> float | None:
-        """Return when the state ceased to be finite [s]; None when it did not."""
+        """Return the time [s] at which the state ceased to be finite, else None."""
         finite = (
             np.isfinite(self._record.qvel[-1]).all() and np.isfinite(self._record.qpos[-1]).all()
         )
         return None if finite else float(self._record.time[-1] - self._record.time[0])
 
     def rows(self) -> Iterator[Row]:
-        """Yield what was measured of what is conserved; nothing of a flight that broke off."""
+        """Yield the conserved quantities as measured; none of a flight that ended early."""
         if self.broken_off() is not None:
             return
         if self._bus is not None and not self._held:
-            reason = "nothing acts from outside: what drifts is the integrator's error, or armature"
+            reason = "no external torque: drift is the integrator's error, or armature"
             if self._constrained():
                 reason += ", or the constraint solver's tolerance"
             if self._soft:
-                reason += ", or what a soft constraint joins is apart and turned by its force"
+                reason += ", or the misalignment of a soft constraint, whose force gives a torque"
             spin, offset = self._drifts(self._record)
             yield Row.judged(Bound("angular momentum", "of the bus", CONSERVED, reason), spin)
-            reason = "it moves on a straight line, whatever turns inside"
+            reason = "it moves on a straight line, independently of internal motion"
             yield Row.judged(Bound("centre of mass", "m", CONSERVED, reason), offset)
         if self._hides_energy():
             return
@@ -82,7 +82,7 @@ class Flight:
         size = kinetic[0] if self._bus is None else self._bus.energy
         taken = model_ties.dissipators(self._model)
         if taken:
-            reason = f"{' and '.join(taken)} can only take energy"
+            reason = f"{' and '.join(taken)} can only dissipate energy"
             bound = Bound("energy gained", "of the bus", CONSERVED, reason)
             yield Row.judged(bound, float(np.diff(energy).max(initial=0.0) / size))
         else:
@@ -90,12 +90,12 @@ class Flight:
             yield Row.judged(bound, meter.drift(energy, size))
 
     def unjudged(self) -> Iterator[str]:
-        """Yield what of conservation was not judged, and why."""
+        """Yield the conserved quantities that were not judged, with the reason."""
         if self._held:
-            yield f"momentum: the world can push the moving bodies, by {', '.join(self._held)}"
+            yield f"momentum: the world acts on the moving bodies, by {', '.join(self._held)}"
         hidden = self._hides_energy()
         if hidden:
-            yield f"energy: {' and '.join(hidden)} store, give back and take some of it unseen"
+            yield f"energy: that of {' and '.join(hidden)} is not in MuJoCo's sum"
         if self.duration < MINUTE:
             yield (
                 f"conservation beyond {self.duration:g} s: a minute would be more than "
@@ -103,7 +103,7 @@ class Flight:
             )
 
     def advice(self) -> Iterator[str]:
-        """Yield how momentum is kept better, where the solver's tolerance is what spoils it."""
+        """Yield how to conserve momentum better, where the solver's tolerance is the cause."""
         tolerance = self._model.opt.tolerance
         if self._bus is None or self._held or not self._constrained() or tolerance == 0.0:
             return
@@ -115,14 +115,14 @@ class Flight:
         exact_spin, exact_offset = self._drifts(self._fly(exact))
         if exact_spin < 0.1 * spin or exact_offset < 0.1 * offset:
             yield (
-                f"the constraint solver stops at a tolerance of {tolerance:g}, and what it leaves "
-                f'acts as if from outside: with <option tolerance="0"/> angular momentum drifts by '
-                f"{exact_spin:.2g} instead of {spin:.2g}, the centre of mass by "
+                f"the constraint solver stops at a tolerance of {tolerance:g}, and its residual "
+                f'acts like an external force: with <option tolerance="0"/> angular momentum '
+                f"drifts by {exact_spin:.2g} instead of {spin:.2g}, the centre of mass by "
                 f"{exact_offset:.2g} m instead of {offset:.2g} m"
             )
 
     def _drifts(self, record: stand.Record) -> tuple[float, float]:
-        """Return the drift of angular momentum, of the bus's, and of the centre of mass [m]."""
+        """Return the drift of angular momentum over the bus's, and of the centre of mass [m]."""
         assert self._bus is not None
         place = meter.centre_of_mass(record)
         since = record.time - record.time[0]
@@ -137,7 +137,7 @@ class Flight:
         return bool(self._soft or self.hits_stops or model_ties.has_friction(self._model))
 
     def _hides_energy(self) -> list[str]:
-        """Return what keeps energy that MuJoCo does not sum."""
+        """Return what stores or dissipates energy that MuJoCo does not sum."""
         hidden = [f"soft constraints ({', '.join(self._soft)})"] if self._soft else []
         hidden += ["stops that are reached"] if self.hits_stops else []
         hidden += ["springs that yield"] if model_ties.springs_yield(self._model) else []
@@ -146,9 +146,9 @@ class Flight:
 
 
 def _of_the_bus(model: Any, start: Any) -> Bus | None:
-    """Return what the first free flyer has, turning as one body; None for a fixed base.
+    """Return momentum and energy of the first free body's rotation; None for a fixed base.
 
-    The share of a fast wheel would hide the errors of the bus.
+    The wheels' own spin is left out, since a fast wheel would hide the errors of the bus.
     """
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
     if not free.size:

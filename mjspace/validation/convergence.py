@@ -1,4 +1,4 @@
-"""The order of convergence that any model shows of itself, and the step that it needs."""
+"""Observed order of convergence of any model, and the step that it needs."""
 
 import copy
 import math
@@ -12,18 +12,19 @@ from mjspace.validation import stand
 from mjspace.validation.benchmark import Conditions
 
 PROBE = 10.0
-"""How long a flight is watched, at the most [s]."""
+"""Longest flight for the observation of convergence [s]."""
 Convergence = list[tuple[float, float]]
-"""Steps [s], each half of the one before, and how fast the attitude, or a fixed base's joints, go
-wrong at each, seen from half of it [rad/s]."""
-_FINE, _COARSE = 1e-9, 1e-3  # rad/s: errors between which convergence is watched
-_ROUNDING = 1e-13  # rad/s: errors that no step makes smaller
+"""Pairs of a step [s], each half of the one before, and its error rate [rad/s]: the difference to
+half the step over the duration, of the attitude or, on a fixed base, of the joints."""
+_FINE, _COARSE = 1e-9, 1e-3  # rad/s: range of error rates in which convergence is observed
+_ROUNDING = 1e-13  # rad/s: error rate due to rounding
 
 
 def observe(model: Any, start: Any) -> Convergence:
-    """Halve the step from a coarse one on, until the error is small or the step a fourth of ours.
+    """Halve the step from a coarse one until the error is small or the step a quarter of the
+    model's.
 
-    So a stiff or a slow model is each probed where its error can be seen, and at little cost.
+    Stiff and slow models are both observed where their error is measurable, at little cost.
     """
     halvings = max(2, math.floor(math.log2(PROBE / model.opt.timestep)))
     step = model.opt.timestep * 2.0 ** (halvings - 2)
@@ -39,27 +40,27 @@ def observe(model: Any, start: Any) -> Convergence:
 
 
 def slope(found: Convergence) -> float:
-    """Return the observed order: the slope of log error over log step at the finest three.
+    """Return the observed order: the slope of log error over log step at the three finest steps.
 
-    NaN where less than two errors can be told from rounding.
+    NaN where fewer than two errors are above rounding.
     """
-    seen = [pair for pair in found if pair[1] > _ROUNDING][-3:]
-    if len(seen) < 2:
+    usable = [pair for pair in found if pair[1] > _ROUNDING][-3:]
+    if len(usable) < 2:
         return math.nan
-    steps, errors = np.log(seen).T
+    steps, errors = np.log(usable).T
     return float(np.polyfit(steps, errors, 1)[0])
 
 
 def step_for(found: Convergence, goal: float, duration: float) -> float:
-    """Return the step [s] that errs by ``goal`` [rad] in ``duration`` [s], as far as is known.
+    """Return the step [s] with an extrapolated error of ``goal`` [rad] in ``duration`` [s].
 
-    No step longer than the coarsest that was seen to do.
+    It is at most the coarsest observed step.
     """
     order, (step, error), coarsest = slope(found), found[-1], found[0][0]
     if math.isnan(order):
         return coarsest
-    in_all = error * duration / (1.0 - 2.0**-order)  # half the step has an error of its own
-    return float(min(step * (goal / in_all) ** (1.0 / order), coarsest))
+    total = error * duration / (1.0 - 2.0**-order)  # includes the error of half the step
+    return float(min(step * (goal / total) ** (1.0 / order), coarsest))
 
 
 def _end(model: Any, start: Any, duration: float, step: float) -> Array:
@@ -70,13 +71,13 @@ def _end(model: Any, start: Any, duration: float, step: float) -> Array:
 
 
 def _apart(model: Any, one: Array, other: Array) -> float:
-    """Return the largest angle [rad] between two attitudes; of a fixed base, between its joints."""
+    """Return the largest angle [rad] between two attitudes or, on a fixed base, between joints."""
     difference = np.zeros(model.nv)
     mujoco.mj_differentiatePos(model, difference, 1.0, one, other)
     free = model.jnt_dofadr[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
-    seen = (
+    compared = (
         np.ravel([range(dof + 3, dof + 6) for dof in free]).astype(int)
         if free.size
         else slice(0, None)
     )
-    return float(np.abs(difference[seen]).max())
+    return float(np.abs(difference[compared]).max())

@@ -61,17 +61,17 @@ def balance(vehicle: Vehicle, y: Array) -> tuple[Array, Array]:
 
 
 def driven(
-    vehicle: Vehicle, y: Array, wanted: Array = NONE, outside: Array = NONE
+    vehicle: Vehicle, y: Array, desired: Array = NONE, outside: Array = NONE
 ) -> tuple[Array, Array]:
-    """Return accelerations (6,) and motor torques (3,) [N m] at ``wanted`` relative accelerations.
+    """Return accelerations (6,) and motor torques (3,) [N m] at ``desired`` relative accelerations.
 
     Those (3,) are of outer gimbal, inner gimbal and wheel [rad/s^2], as are the torques;
     ``outside`` (3,) is the torque from outside in body axes [N m].
     """
     mass, bias = balance(vehicle, y)
     acceleration = np.empty(6)
-    acceleration[:3] = np.linalg.solve(mass[:3, :3], outside - bias[:3] - mass[:3, 3:] @ wanted)
-    acceleration[3:] = wanted
+    acceleration[:3] = np.linalg.solve(mass[:3, :3], outside - bias[:3] - mass[:3, 3:] @ desired)
+    acceleration[3:] = desired
     return acceleration, mass[3:] @ acceleration + bias[3:]
 
 

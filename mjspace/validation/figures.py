@@ -1,4 +1,4 @@
-"""A benchmark's figure: what moved, and how each integrator's error grew."""
+"""A benchmark's figure: the motion, and the error of each integrator over time."""
 
 import io
 from typing import Any
@@ -13,7 +13,7 @@ from mjspace.plotting.style import COLORS, FAINT, STYLE
 from mjspace.validation.benchmark import Integrator
 from mjspace.validation.results import Line, Section
 
-# The first-order ones often coincide: dashes leave all of them to be seen.
+# The first-order integrators often coincide: dashes keep all of them visible.
 _INTEGRATORS: dict[Integrator, tuple[str, str]] = {
     "RK4": ("#2f6fd0", "-"),
     "Euler": ("#d1453b", "-"),
@@ -29,7 +29,7 @@ def svg(section: Section) -> str:
     with matplotlib.rc_context(_STYLE):
         page = Figure(figsize=(10.0, 3.0))
         FigureCanvasSVG(page)
-        # Laid out by hand, which takes a tenth of the time.
+        # A fixed layout takes a tenth of the time of an automatic one.
         room = {"left": 0.075, "right": 0.98, "bottom": 0.16, "top": 0.97, "wspace": 0.22}
         motion, error = page.subplots(1, 2, width_ratios=[1.25, 1.0], gridspec_kw=room)
         _draw_motion(motion, section)
@@ -41,7 +41,7 @@ def svg(section: Section) -> str:
 
 
 def _draw_motion(axes: Any, section: Section) -> None:
-    # A truth and its dots are of one color, whatever the order of the lines.
+    # The exact line and its dots have one color, in any order of the lines.
     colors: dict[str, str] = {}
     for line in section.motion:
         name = line.label.removesuffix(", MuJoCo")
@@ -58,14 +58,14 @@ def _draw_motion(axes: Any, section: Section) -> None:
 
 
 def _key(line: Line) -> str | None:
-    """Return the line's legend: dots beside a truth of the same name need none."""
+    """Return the line's legend; dots beside an exact line of the same name have none."""
     return None if line.label.endswith(", MuJoCo") else line.label
 
 
 def _draw_errors(axes: Any, section: Section) -> None:
     for integrator, line in section.errors.items():
         y = np.abs(np.array(line.y, dtype=float))
-        y[y == 0.0] = np.nan  # nothing to show on a logarithmic axis
+        y[y == 0.0] = np.nan  # not drawn: the axis is logarithmic
         color, dashes = _INTEGRATORS[integrator]
         axes.plot(line.x, y, color=color, linestyle=dashes, label=integrator)
     axes.set_yscale("log")

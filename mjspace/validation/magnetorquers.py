@@ -1,4 +1,4 @@
-"""The B-dot law on ideal magnetorquers, compiled: a load that costs little at every stage."""
+"""The B-dot law on ideal magnetorquers, compiled for evaluation at every stage."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from numba import njit
 from mjspace.environment import kepler
 from mjspace.environment.dipole import dipole
 
-_HALF = 0.1  # s, of the central difference that is the field's change: good to (2 n HALF)^2 / 6
+_HALF = 0.1  # s, half the interval of the field's central difference; error (2 n HALF)^2 / 6
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,7 +1,7 @@
-"""Momentum and energy of a recorded flight, summed body by body.
+"""Momentum and energy of a recorded flight, summed over its bodies.
 
-Our own sums, not MuJoCo's sensors: armature, which moves nothing that one can see, is in none of
-them, and nothing is stale.
+The sums are independent of MuJoCo's sensors: they do not contain armature, which is not the inertia
+of any body, and belong to the present state, not to that before the step.
 """
 
 from functools import lru_cache
@@ -42,8 +42,8 @@ def potential_energy(record: Record) -> Array:
 def drift(values: Array, scale: float | None = None) -> float:
     """Return the largest departure of the rows from the first, over ``scale`` in their unit.
 
-    ``scale`` is the first row's size when left out; give the bus's part where a fast wheel has most
-    of it.
+    The default ``scale`` is the norm of the first row; where a fast wheel dominates it, use the
+    bus's part.
     """
     rows = values.reshape(len(values), -1)
     size = np.linalg.norm(rows[0]) if scale is None else scale
@@ -51,7 +51,7 @@ def drift(values: Array, scale: float | None = None) -> float:
 
 
 class _Sums(NamedTuple):
-    """Of all moving bodies, one row for each of the record."""
+    """Sums over all moving bodies, one row for each of the record."""
 
     centre: Array
     linear: Array
@@ -62,14 +62,14 @@ class _Sums(NamedTuple):
 
 @lru_cache(maxsize=4)
 def _sums(record: Record) -> _Sums:
-    """Return the sums; a benchmark asks for several of one record, and then for none of it."""
+    """Return the sums of a record, cached for the functions above."""
     data = mujoco.MjData(record.model)
     rows = []
     for qpos, qvel in zip(record.qpos, record.qvel, strict=True):
         data.qpos[:], data.qvel[:] = qpos, qvel
         mujoco.mj_kinematics(record.model, data)
         mujoco.mj_comPos(record.model, data)
-        mujoco.mj_tendon(record.model, data)  # whose springs count
+        mujoco.mj_tendon(record.model, data)  # its springs have energy
         mujoco.mj_fwdVelocity(record.model, data)
         mujoco.mj_energyPos(record.model, data)
         rows.append((*_of_row(record.model, data), data.energy[0]))
@@ -95,5 +95,5 @@ def _of_row(model: Any, data: Any) -> tuple[Array, Array, Array, float]:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Return a x b for rows (n, 3): ``np.cross`` takes ten times as long on a few."""
+    """Return a x b for rows (n, 3), ten times as fast as ``np.cross`` for a few rows."""
     return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]

@@ -1,4 +1,4 @@
-"""A user's model file, MJCF, URDF or MJB, compiled; and what the compiler's settings made of it."""
+"""Reads a user's model file (MJCF, URDF or MJB) and reports what compiler settings changed."""
 
 import warnings
 from collections.abc import Iterator
@@ -20,28 +20,28 @@ _NEUTRAL: dict[str, Any] = {
     "inertiagrouprange": (0, 5),
     "discardvisual": False,
 }
-"""Settings that can change mass or inertia, with the value that leaves them as the file says."""
+"""Settings that can change mass or inertia, with the value that keeps them as in the file."""
 
 
 class Source(NamedTuple):
-    """A model and where it comes from."""
+    """A model with its source."""
 
     model: Any
     """Compiled."""
     spec: Any
     """The ``MjSpec`` before it was compiled; None for an MJB file."""
     warnings: list[str]
-    """What MuJoCo warned of while it read and compiled the file."""
+    """MuJoCo's warnings from reading and compiling the file."""
 
 
 def read(path: Path) -> Source:
     """Return the model in a file.
 
     Raises:
-        ValueError: MuJoCo cannot read or compile the file; in one line.
+        ValueError: MuJoCo cannot read or compile the file; the message is one line.
         OSError: the file cannot be read.
     """
-    path.open("rb").close()  # MuJoCo's own message does not say why a file cannot be read
+    path.open("rb").close()  # its OSError says why a file cannot be read, unlike MuJoCo's
     if path.suffix not in KINDS:
         raise ValueError("a model is an MJCF (.xml), URDF (.urdf or .xml) or compiled (.mjb) file")
     with warnings.catch_warnings(record=True) as caught:
@@ -50,10 +50,12 @@ def read(path: Path) -> Source:
             if path.suffix == ".mjb":
                 model, spec = mujoco.MjModel.from_binary_path(str(path)), None
             else:
-                # Parts are found beside a file that is named in full.
+                # Included files are found relative to an absolute path.
                 spec = mujoco.MjSpec.from_file(str(path.resolve()))
-                model = spec.copy().compile()  # which takes static bodies out of the spec
-        # FatalError is MuJoCo's for what it cannot go on from
+                model = (
+                    spec.copy().compile()
+                )  # a copy: compiling removes static bodies from the spec
+        # FatalError is MuJoCo's for errors that it cannot continue from
         except (ValueError, mujoco.FatalError) as error:
             raise ValueError(_refusal(path, error)) from error
     return Source(model, spec, [_line(str(warning.message)) for warning in caught])
@@ -71,12 +73,12 @@ def _line(text: str) -> str:
 
 
 def findings(spec: Any) -> Iterator[str]:
-    """Yield what the compiler's settings changed of the masses and inertias that the file states.
+    """Yield how the compiler's settings changed the masses and inertias that the file states.
 
-    Every finding has the number of the file and the one that flies.
+    Every finding has the value in the file and the value after compilation.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # told by ``read`` already
+        warnings.simplefilter("ignore")  # already reported by ``read``
         yield from _findings(spec)
 
 
@@ -87,7 +89,7 @@ def _findings(spec: Any) -> Iterator[str]:
         for setting, neutral in _NEUTRAL.items()
         if np.any(getattr(spec.compiler, setting) != np.asarray(neutral))
     ]
-    if "settotalmass" in settings:  # it scales whatever the others have made
+    if "settotalmass" in settings:  # it scales the result of the others
         before = _compiled_without(bare, "settotalmass").body_mass.sum()
         after = bare.copy().compile().body_mass.sum()
         if abs(after - before) > 1e-9 * before:
@@ -106,9 +108,9 @@ def _findings(spec: Any) -> Iterator[str]:
 
 
 def _bare(spec: Any) -> Any:
-    """Return the bodies and shapes alone, none of which moves: so any setting can be left out.
+    """Return the spec reduced to bodies and geoms, without joints: it compiles with any setting.
 
-    Bodies that are fused otherwise stay, and a light one is no error.
+    Bodies are not fused, and a body without mass is not an error.
     """
     bare = spec.copy()
     bare.compiler.fusestatic = False
@@ -126,8 +128,8 @@ def _balanced(spec: Any) -> Iterator[str]:
         if body.explicitinertial and 2.0 * stated[2] > stated.sum() * (1.0 + 1e-9):
             yield (
                 f"balanceinertia: {_called(body.name, number)} gets the principal moments "
-                f"{_numbers([stated.mean()] * 3)} kg m^2 instead of {_numbers(stated)}, which no "
-                f"body has: the largest exceeds the sum of the others"
+                f"{_numbers([stated.mean()] * 3)} kg m^2 instead of {_numbers(stated)}, which are "
+                f"impossible: the largest exceeds the sum of the others"
             )
 
 
@@ -147,7 +149,7 @@ def _compiled_without(spec: Any, setting: str) -> Any:
 
 
 def _changed_by(bare: Any, flown: Any, setting: str) -> Iterator[str]:
-    shown = f"{setting}={_shown(getattr(bare.compiler, setting))}"
+    text = f"{setting}={_as_text(getattr(bare.compiler, setting))}"
     stated = _compiled_without(bare, setting)
     for body in range(1, flown.nbody):
         for what, unit, here, there in (
@@ -156,7 +158,7 @@ def _changed_by(bare: Any, flown: Any, setting: str) -> Iterator[str]:
         ):
             if not np.allclose(here, there, rtol=1e-9, atol=0.0):
                 yield (
-                    f"{shown}: the {what} of {_name(flown, body)} is {_numbers(here)} {unit} "
+                    f"{text}: the {what} of {_name(flown, body)} is {_numbers(here)} {unit} "
                     f"instead of {_numbers(there)} {unit}"
                 )
 
@@ -174,8 +176,8 @@ def _fused(spec: Any, bare: Any) -> Iterator[str]:
             into = into.parent
         if into.name == "world":
             yield (
-                f"fusestatic: {_name(bare, number)} was merged with the world, on which it is held "
-                f"fast: its {mass} count for nothing; to let it fly, join it to a root link by a "
+                f"fusestatic: {_name(bare, number)} was merged with the world, to which it is "
+                f"fixed: its {mass} have no effect; to let it move, join it to a root link by a "
                 f'joint of type "floating" (URDF), or give it a <freejoint/> (MJCF)'
             )
         else:
@@ -194,7 +196,7 @@ def _called(name: str, number: int) -> str:
     return f"body {name!r}" if name else f"body {number}"
 
 
-def _shown(value: Any) -> str:
+def _as_text(value: Any) -> str:
     if isinstance(value, mujoco.mjtInertiaFromGeom):
         return str(value.name).removeprefix("mjINERTIAFROMGEOM_").lower()
     if isinstance(value, bool):

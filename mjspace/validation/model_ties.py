@@ -1,4 +1,4 @@
-"""What holds a model on the world, and what its constraints do: where conservation cannot show."""
+"""Connections of a model to the world, constraints and dissipation: what limits conservation."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,18 +12,18 @@ _BODIES = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
 
 
 def findings(model: Any) -> Iterator[str]:
-    """Yield what is unusual in a model of one spacecraft: its free joints and what is held."""
+    """Yield what is unusual in the model of one spacecraft: its free joints and fixed bodies."""
     free = [joint for joint in range(model.njnt) if model.jnt_type[joint] == _FREE]
     if not free:
         yield (
-            f"no free joint: the vehicle hangs on the world by {_joints(model)}; its momentum "
-            f"cannot be checked; give its bus a <freejoint/> if it shall fly"
+            f"no free joint: the vehicle is attached to the world by {_joints(model)}, and its "
+            f"momentum cannot be checked; for a free flyer give its bus a <freejoint/>"
         )
     if len(free) > 1:
         bodies = ", ".join(name(model, "body", model.jnt_bodyid[joint]) for joint in free)
         yield (
-            f"{len(free)} free joints, of {bodies}: momentum is that of all together, and a "
-            f"scenario flies the first alone as its bus"
+            f"{len(free)} free joints, of {bodies}: momentum is the total of all, and a scenario "
+            f"takes the first alone as its bus"
         )
     fixed = [
         body
@@ -32,11 +32,14 @@ def findings(model: Any) -> Iterator[str]:
     ]
     if fixed:
         bodies = ", ".join(f"{name(model, 'body', b)} {model.body_mass[b]:.6g} kg" for b in fixed)
-        yield f"held fast in the world, and counting for nothing: {bodies}"
+        yield f"fixed to the world, without effect on the motion: {bodies}"
 
 
 def to_the_world(model: Any) -> list[str]:
-    """Return what can push the moving bodies against the world: momentum is not conserved then."""
+    """Return what can exert a force between the moving bodies and the world.
+
+    Momentum is conserved only if there is none.
+    """
     held = [_joints(model)] if _hinged_to_world(model) else []
     for joint in np.flatnonzero(model.jnt_type == _FREE):
         dofs = slice(model.jnt_dofadr[joint], model.jnt_dofadr[joint] + 6)
@@ -53,9 +56,9 @@ def to_the_world(model: Any) -> list[str]:
 
 
 def soft(model: Any) -> list[str]:
-    """Return the constraints that always act, and like a spring and a damper of short time.
+    """Return the constraints that always act, as stiff springs and dampers.
 
-    Friction and stops, whose force jumps, are not among them.
+    Friction and stops, whose force is discontinuous, are not among them.
     """
     off = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_EQUALITY
     if model.opt.disableflags & off:
@@ -64,7 +67,7 @@ def soft(model: Any) -> list[str]:
 
 
 def dissipators(model: Any) -> list[str]:
-    """Return what takes energy at all times: dampers and friction."""
+    """Return what dissipates energy: dampers and friction."""
     damped = (
         ("damping", ("dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly")),
         ("actuators' damping", ("actuator_damping", "actuator_dampingpoly")),
@@ -76,7 +79,7 @@ def dissipators(model: Any) -> list[str]:
 
 
 def springs_yield(model: Any) -> bool:
-    """Tell whether springs are plastic: their energy is unseen, their force has a corner."""
+    """Tell whether springs are plastic: their energy is not in MuJoCo's sum, their force kinks."""
     plastic = ("jnt_plasticadr", "tendon_plasticadr", "flex_plasticadr")
     return any(bool(np.any(getattr(model, array) >= 0)) for array in plastic)
 
@@ -98,7 +101,7 @@ def has_stops(model: Any) -> bool:
 
 
 def name(model: Any, kind: str, number: Any) -> str:
-    """Return how an element is called in a message: by its name, or its number in the model."""
+    """Return an element's name for a message, or its number in the model."""
     element = getattr(model, kind)(int(number))
     return f"{kind} {element.name!r}" if element.name else f"{kind} {number}"
 
@@ -114,7 +117,7 @@ def _hinged_to_world(model: Any) -> list[int]:
 
 
 def _joints(model: Any) -> str:
-    """Return the names of the joints to the world, where they are few enough to be read."""
+    """Return the names of the joints to the world, or their number where there are many."""
     joints = _hinged_to_world(model)
     if len(joints) > _FEW:
         return f"{len(joints)} joints"
@@ -134,7 +137,7 @@ def _anchored_equalities(model: Any) -> Iterator[int]:
 
 
 def _anchored_tendons(model: Any) -> Iterator[int]:
-    """Yield the spatial tendons that act, and touch what cannot move."""
+    """Yield the spatial tendons that exert forces on bodies that cannot move."""
     forces = (
         *("tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly"),
         *("tendon_frictionloss", "tendon_limited"),

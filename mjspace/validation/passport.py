@@ -1,9 +1,9 @@
 """The physics passport of any model: guards, conservation, order of convergence, step advice.
 
-The model is flown free, without gravity, contact or control: moving as its first keyframe says
-and, where that leaves a speed at zero, at a tenth of a radian or metre per second. What is
-conserved then shows how far its integrator and step can be trusted. What cannot be judged that
-way, as energy where soft constraints store some, is named with the reason.
+The model is flown free, without gravity, contact or control. It starts from its first keyframe;
+velocities that are zero there are set to about 0.1 rad/s or m/s. The conserved quantities measure
+the accuracy of its integrator and step. Quantities that cannot be judged this way, such as energy
+with soft constraints, are reported with the reason.
 """
 
 import copy
@@ -28,23 +28,23 @@ from mjspace.vehicle import model_checks, stability
 STIR = 0.1  # rad/s, m/s
 GOALS = (1e-9, 1e-6)  # rad in a minute
 ORDERS_OFF = 0.3
-"""How far an observed order may be from the scheme's: steps are coarse, and the motion any."""
+"""Allowed deviation of an observed order from the scheme's: steps are coarse, the motion is any."""
 ADVISED_OFF = 1.0
-"""How far it may be for a step to be extrapolated from it."""
+"""Allowed deviation for the extrapolation of a step."""
 _ORDERS = {"RK4": 4.0, "EULER": 1.0, "IMPLICIT": 1.0, "IMPLICITFAST": 1.0}
 _JUMPING = mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS | mujoco.mjtDisableBit.mjDSBL_LIMIT
 
 
 class Finding(Data):
-    """What a guard said of the model."""
+    """A guard's finding."""
 
     refused: bool
-    """Whether a scenario with this model would be refused, or only warned of."""
+    """Whether a scenario with this model is refused, or only warned of."""
     text: str
 
 
 class Passport(Data):
-    """What was found out about a model."""
+    """Results for a model."""
 
     model: str
     integrator: str
@@ -53,7 +53,7 @@ class Passport(Data):
     rows: list[Row]
     advice: list[str]
     unjudged: list[str]
-    """What was not judged, and why."""
+    """Quantities that were not judged, with the reason."""
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -106,14 +106,14 @@ def _findings(source: Source, flight: Flight) -> Iterator[Finding]:
     if end is not None:
         text = f"flown free, its state is no longer finite after {end:g} s of {flight.duration:g} s"
         yield Finding(refused=True, text=text)
-    told = [*(str(warning.message) for warning in caught), *source.warnings]
-    told += model_ties.findings(model)
-    told += [] if source.spec is None else model_files.findings(source.spec)
-    yield from (Finding(refused=False, text=text) for text in told)
+    texts = [*(str(warning.message) for warning in caught), *source.warnings]
+    texts += model_ties.findings(model)
+    texts += [] if source.spec is None else model_files.findings(source.spec)
+    yield from (Finding(refused=False, text=text) for text in texts)
 
 
 def _undisturbed(model: Any) -> Any:
-    """Return a copy on which nothing acts from outside, and that does not reset itself."""
+    """Return a copy without external forces, contacts, control and automatic reset."""
     free = copy.copy(model)
     free.opt.gravity[:] = 0.0
     free.opt.wind[:] = 0.0
@@ -130,7 +130,7 @@ def _stirred(model: Any) -> Any:
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
-    # Alternating signs and no two speeds alike: no axis and no joint stays out of it.
+    # Alternating signs and different speeds, so that every axis and joint takes part.
     index = np.arange(model.nv)
     stir = STIR * (1.0 + 0.3 * np.cos(index)) * (-1.0) ** index
     data.qvel[:] = np.where(data.qvel == 0.0, stir, data.qvel)
@@ -138,7 +138,7 @@ def _stirred(model: Any) -> Any:
 
 
 def _left_out(source: Source, flight: Flight) -> Iterator[str]:
-    """Yield what the flights were without, and what has no order."""
+    """Yield what the flights leave out, and what has no order of convergence."""
     model = source.model
     soft = model_ties.soft(model)
     if soft:
@@ -152,8 +152,8 @@ def _left_out(source: Source, flight: Flight) -> Iterator[str]:
     jumping += ["stops that are reached"] if flight.hits_stops else []
     if jumping:
         yield (
-            f"order and step with {' and '.join(jumping)}: forces that jump leave no order; both "
-            f"are judged without"
+            f"order and step with {' and '.join(jumping)}: discontinuous forces have no order; "
+            f"both are judged without"
         )
     off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     if not model.opt.disableflags & off and np.any(model.geom_contype | model.geom_conaffinity):
@@ -182,7 +182,7 @@ def _order(model: Any, found: Convergence) -> Iterator[Row]:
 
 
 def _is_unresolved(model: Any, found: Convergence) -> bool:
-    """Tell whether the error falls faster than the scheme's, as where a stiff motion dies out."""
+    """Tell whether the error falls faster than the scheme's, as with a decaying stiff motion."""
     return convergence.slope(found) > _ORDERS.get(_name(model), math.inf) + ORDERS_OFF
 
 
@@ -206,7 +206,7 @@ def step_advice(found: Convergence, what: str) -> Iterator[str]:
         steps = f"{found[0][0]:.2g} to {found[-1][0]:.2g} s"
         yield (
             f"no step can be advised: over steps of {steps} the error falls with order "
-            f"{order:.2g}, not 4, so that no other step can be told from them"
+            f"{order:.2g}, not 4, so that no other step can be extrapolated"
         )
         return
     for goal in GOALS:

@@ -1,4 +1,4 @@
-"""The results as pages: one HTML file that needs nothing else, and Markdown with its figures."""
+"""The results as pages: one self-contained HTML file, and Markdown with its figures."""
 
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ JSON, HTML = "validation.json", "validation.html"
 def write(results: Results, folder: Path) -> tuple[Path, Path]:
     """Write the JSON and the HTML report into ``folder``, made if need be; return their paths.
 
-    A quick run's report has no figures: they would take longer than the flights.
+    A quick run's report has no figures, which would take longer than the flights.
 
     Raises:
         OSError: a file cannot be written.
@@ -65,10 +65,10 @@ def _drawn(results: Results) -> dict[str, str]:
     return {results.sections[index].name: drawing for index, drawing in workers.each(calls)}
 
 
-def _rendered(template: str, **shown: Any) -> str:
-    """Return the page of what is ``shown``: ``results`` and ``figures``, or a ``passport``.
+def _rendered(template: str, **content: Any) -> str:
+    """Return the page for ``results`` and ``figures``, or for a ``passport``.
 
-    ``figures`` are themselves, or the name of the folder that they are in.
+    ``figures`` are SVG texts by name, or the name of the folder that contains them.
     """
     environment = Environment(
         loader=PackageLoader("mjspace.validation"),
@@ -84,7 +84,7 @@ def _rendered(template: str, **shown: Any) -> str:
         "under": wording.under,
         "anchor": _anchor,
     }
-    return environment.get_template(template).render(words | shown)
+    return environment.get_template(template).render(words | content)
 
 
 def _anchor(section: Section) -> str:

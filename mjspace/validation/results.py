@@ -1,4 +1,4 @@
-"""What ``mjspace validate`` found out, as data: written to JSON, read by the report's pages."""
+"""The results of ``mjspace validate`` as data: written to JSON, and input of the report's pages."""
 
 import math
 from collections.abc import Mapping
@@ -10,17 +10,17 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, computed_field
 from mjspace.validation.benchmark import Bound, Curve, Fault, Integrator
 
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
-"""JSON has no NaN: null stands for it."""
+"""A number that is null in JSON where it is NaN."""
 
 
 class Data(BaseModel):
-    """Plain data that does not change; what is computed is ignored when it is read."""
+    """Frozen data; unknown and computed fields are ignored on reading."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
 
 class Row(Data):
-    """A quantity, measured under RK4 and judged, and what the other integrators make of it."""
+    """A quantity measured with RK4, its verdict, and its values with the other integrators."""
 
     quantity: str
     unit: str
@@ -35,7 +35,7 @@ class Row(Data):
     def judged(
         bound: Bound, measured: float, others: Mapping[Integrator, float] = MappingProxyType({})
     ) -> "Row":
-        """Return what was measured with the bound's verdict on it."""
+        """Return the measured value with the verdict of its bound."""
         return Row(
             quantity=bound.quantity,
             unit=bound.unit,
@@ -49,19 +49,19 @@ class Row(Data):
 
 
 class Injected(Data):
-    """What became of an injected fault."""
+    """The result of an injected fault."""
 
     fault: Fault
     meaning: str
-    wanted: bool
-    """Whether the benchmark claims to catch it."""
+    expected: bool
+    """Whether the benchmark claims to detect it."""
     broken: list[str]
-    """The quantities that it put out of bounds."""
+    """The quantities that left their bounds."""
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def caught(self) -> bool:
-        """Whether the benchmark failed with it, as it should."""
+        """Whether the benchmark detected it."""
         return bool(self.broken)
 
 
@@ -75,7 +75,7 @@ class Line(Data):
 
     @staticmethod
     def of(curve: Curve) -> "Line":
-        """Return a curve with six digits, as much as a figure can show."""
+        """Return a curve rounded to six digits, enough for a figure."""
         x, y = ([float(f"{value:.6g}") for value in values] for values in (curve.x, curve.y))
         return Line(label=curve.label, x=x, y=y, dots=curve.dots)
 
@@ -99,26 +99,26 @@ class Section(Data):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def passed(self) -> bool:
-        """Whether every bound held, and every fault that should be caught was."""
+        """Whether every bound held and every expected fault was detected."""
         return all(row.passed for row in self.rows) and not self.missed
 
     @property
     def missed(self) -> list[Injected]:
-        """The faults that the benchmark claims to catch and did not."""
-        return [injected for injected in self.faults if injected.wanted and not injected.broken]
+        """The faults that the benchmark claims to detect and did not."""
+        return [injected for injected in self.faults if injected.expected and not injected.broken]
 
 
 class Results(Data):
-    """Everything that one run of the suite found; the same from run to run on one machine."""
+    """Results of one run of the suite; reproducible on one machine."""
 
     versions: dict[str, str]
     quick: bool
     sections: list[Section]
     remarks: list[str] = []
-    """What was left out, and why."""
+    """Parts that were left out, with the reason."""
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def passed(self) -> bool:
-        """Whether everything did."""
+        """Whether every section passed."""
         return all(section.passed for section in self.sections)

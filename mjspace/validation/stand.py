@@ -1,7 +1,7 @@
-"""The test stand: builds a benchmark's model, faulty if so wanted, and flies it.
+"""The test stand: builds a benchmark's model, with an injected fault if requested, and flies it.
 
-Forces of a benchmark are evaluated inside MuJoCo's stages, through ``mjcb_passive``, as a function
-of state and time alone. Everything here is for one process: that callback is global.
+Forces of a benchmark are evaluated in MuJoCo's stages, through ``mjcb_passive``, as a function of
+state and time alone. The callback is global, so that flights need separate processes.
 """
 
 from collections.abc import Callable
@@ -20,15 +20,15 @@ from mjspace.scenario.environment import Environment
 from mjspace.validation.benchmark import Conditions, Fault
 
 Load = Callable[[Any, Any, float], Array]
-"""(model, data, time [s]) -> generalized force, shape (nv,); positions and velocities are those of
-the stage, ``data.time`` is not to be used: it has rounding that ``time`` has not."""
+"""(model, data, time [s]) -> generalized force, shape (nv,). Positions and velocities are those of
+the stage. Use ``time``, not ``data.time``, which has rounding errors."""
 
 MODELS = Path(str(files("mjspace.assets"))) / "validation"
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A flight, sampled: from its start to its end, both included; equal to itself alone."""
+    """A sampled flight, including its start and its end; compared by identity."""
 
     model: Any
     time: Array  # s, shape (n,)
@@ -43,10 +43,10 @@ def build(
     adapt: Callable[[Any], None] | None = None,
     outside: Environment | None = None,
 ) -> Any:
-    """Return the compiled ``assets/validation/<name>.xml``, with the fault that is wanted in it.
+    """Return the compiled ``assets/validation/<name>.xml``, with the fault of ``conditions``.
 
-    ``adapt`` changes the ``MjSpec`` before it is compiled; ``outside`` is the environment that
-    ``start`` will be given.
+    ``adapt`` changes the ``MjSpec`` before it is compiled; ``outside`` is the environment that is
+    passed to ``start``.
     """
     spec = mujoco.MjSpec.from_file(str(MODELS / f"{name}.xml"))
     if adapt is not None:
@@ -57,12 +57,12 @@ def build(
     if outside is not None:
         spec.nuserdata = environment.userdata_size(outside, {})
     model = spec.compile()
-    _spoil(model, conditions.fault)
+    _inject(model, conditions.fault)
     return model
 
 
 def start(model: Any, outside: Environment | None = None) -> Any:
-    """Return a fresh ``MjData``, in ``outside`` if given: mjspace's own native environment."""
+    """Return a new ``MjData``, with ``outside`` as mjspace's native environment if it is set."""
     data = mujoco.MjData(model)
     environment.install()
     if outside is not None:
@@ -80,9 +80,9 @@ def fly(
     before_step: Callable[[Any, Any, float], None] | None = None,
     samples: int = 200,
 ) -> Record:
-    """Advance ``data`` by ``duration`` [s], the nearest whole number of steps.
+    """Advance ``data`` by ``duration`` [s], rounded to a whole number of steps.
 
-    A state that is not finite ends the flight; the record's last row shows it.
+    A state that is not finite ends the flight; it is the last row of the record.
     """
     step, begin = model.opt.timestep, data.time
     steps = round(duration / step)
@@ -136,7 +136,7 @@ def _installer(load: Load | None) -> Callable[[], None]:
 
 
 def _hold_loads(model: Any, data: Any) -> None:
-    """Apply what acts now for a whole step, as a loop does that sets forces before each step."""
+    """Hold the present loads for a whole step, like a loop that sets forces before each step."""
     mujoco.mj_forward(model, data)
     acting = data.qfrc_passive.copy()
     mujoco.set_mjcb_passive(None)
@@ -144,10 +144,10 @@ def _hold_loads(model: Any, data: Any) -> None:
     data.qfrc_applied = acting - data.qfrc_passive
 
 
-def _spoil(model: Any, fault: Fault | None) -> None:
+def _inject(model: Any, fault: Fault | None) -> None:
     if fault == "armature":
         jointed = model.jnt_dofadr[model.jnt_type != mujoco.mjtJoint.mjJNT_FREE]
-        # A lone body's free joint inherits a default class' armature.
+        # A single body's free joint inherits armature from the default class.
         dofs = [d for d in jointed if d >= 0] or list(range(3, 6))
         model.dof_armature[dofs] += 0.1 * model.dof_M0[dofs]
     elif fault == "inertia":

@@ -1,4 +1,4 @@
-"""Flies the benchmarks: as they should be, under other integrators, at other steps, with faults."""
+"""Flies the benchmarks: nominally, with other integrators, at other steps, with injected faults."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -19,17 +19,17 @@ from mjspace.validation.benchmark import (
 from mjspace.validation.results import Injected, Line, Results, Row, Section
 
 ORDER, ORDER_ALLOWED = 4.0, 0.1
-"""RK4's order of convergence, and how far from it an observed one may be."""
+"""RK4's order of convergence, and the allowed deviation of an observed one."""
 _EVERYWHERE: tuple[Fault, ...] = ("armature", "integrator", "held", "inertia")
 
 Flight = tuple[Benchmark, Conditions]
 
 
 def chosen(names: Sequence[str]) -> list[Benchmark]:
-    """Return the benchmarks of those names; all of them for none.
+    """Return the benchmarks with these names; all benchmarks if there are no names.
 
     Raises:
-        ValueError: no such benchmark; the message names those that there are.
+        ValueError: a name is unknown; the message lists the known ones.
     """
     known = {benchmark.name: benchmark for benchmark in benchmarks.ALL}
     for name in names:
@@ -39,19 +39,19 @@ def chosen(names: Sequence[str]) -> list[Benchmark]:
 
 
 def validate(
-    wanted: Sequence[Benchmark],
+    selected: Sequence[Benchmark],
     *,
     quick: bool = False,
     progress: Callable[[float], None] = lambda done: None,
     fly_all: Callable[[Sequence[Flight]], Iterable[tuple[Flight, Readings]]] | None = None,
 ) -> Results:
-    """Fly all that the benchmarks ask for and judge it.
+    """Fly all conditions of the benchmarks and judge them.
 
-    ``quick`` flies each benchmark once, short. ``progress`` is told the fraction done. ``fly_all``
-    yields flights with their readings, in any order; every core is used when left out.
+    ``quick`` flies each benchmark once, short. ``progress`` is called with the fraction done.
+    ``fly_all`` yields flights with their readings, in any order; the default uses every core.
     """
-    planned = [(b, c) for b in wanted for c in _plan(b, quick)]
-    # The first of a plan is the longest: begun first, it does not keep the others waiting.
+    planned = [(b, c) for b in selected for c in _plan(b, quick)]
+    # The longest flights begin first, so that all cores end at nearly the same time.
     planned.sort(key=lambda flight: flight[1].short)
     flown: dict[tuple[str, Conditions], Readings] = {}
     for (benchmark, conditions), readings in (fly_all or on_every_core)(planned):
@@ -61,13 +61,13 @@ def validate(
         versions=software(),
         quick=quick,
         sections=[
-            _section(b, {c: flown[b.name, c] for c in _plan(b, quick)}, quick) for b in wanted
+            _section(b, {c: flown[b.name, c] for c in _plan(b, quick)}, quick) for b in selected
         ],
     )
 
 
 def on_every_core(planned: Sequence[Flight]) -> Iterator[tuple[Flight, Readings]]:
-    """Yield each flight when it is done, with its readings."""
+    """Yield each flight with its readings as soon as it is done."""
     for index, readings in workers.each([(b.fly, c) for b, c in planned]):
         yield planned[index], readings
 
@@ -133,8 +133,8 @@ def _section(benchmark: Benchmark, flown: dict[Conditions, Readings], quick: boo
 def _order(quantity: str, at: dict[float, Readings]) -> Row:
     steps = list(at)
     errors = [readings.values[quantity] for readings in at.values()]
-    seen = all(0.0 < error < np.inf for error in errors)
-    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0]) if seen else np.nan
+    usable = all(0.0 < error < np.inf for error in errors)
+    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0]) if usable else np.nan
     reason = f"RK4's order: the slope over steps of {', '.join(f'{step:g}' for step in steps)} s"
     return Row.judged(Bound(f"order of {quantity}", "", ORDER_ALLOWED, reason, ORDER), slope)
 
@@ -143,6 +143,6 @@ def _injected(benchmark: Benchmark, fault: Fault, readings: Readings) -> Injecte
     return Injected(
         fault=fault,
         meaning=benchmark.catches.get(fault) or FAULTS[fault],
-        wanted=fault in benchmark.catches,
+        expected=fault in benchmark.catches,
         broken=[b.quantity for b in benchmark.bounds if not b.admits(readings.values[b.quantity])],
     )

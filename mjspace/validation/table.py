@@ -18,7 +18,7 @@ _WIDE = 150  # columns that a table with reasons needs
 def show(results: Results) -> None:
     """Print every quantity with its bound and verdict, then which fault was caught by whom.
 
-    A narrow terminal is spared the reasons of the bounds; the report has them.
+    A narrow terminal omits the reasons of the bounds; the report has them.
     """
     console = _console()
     console.print(_quantities(results, reasons=console.width >= _WIDE))
@@ -28,7 +28,7 @@ def show(results: Results) -> None:
     for section in results.sections:
         for injected in section.missed:
             console.print(
-                f"{_FAIL} {section.name} did not notice: {escape(injected.meaning)}",
+                f"{_FAIL} {section.name} did not detect: {escape(injected.meaning)}",
                 highlight=False,
             )
     for remark in results.remarks:
@@ -98,7 +98,7 @@ def _matrix(results: Results) -> Table:
                 else "[green]caught[/]"
                 if marks[fault].broken
                 else "[bold red]MISSED[/]"
-                if marks[fault].wanted
+                if marks[fault].expected
                 else "[dim]-[/]"
                 for fault in FAULTS
             ),

@@ -1,4 +1,4 @@
-"""How a result's numbers are written, on the terminal and in the report."""
+"""Formats a result's numbers for the terminal and the report."""
 
 import math
 
@@ -6,16 +6,16 @@ from mjspace.validation.benchmark import Integrator
 from mjspace.validation.results import Row
 
 OTHERS: tuple[Integrator, ...] = ("Euler", "implicit", "implicitfast")
-"""The integrators that are shown beside RK4, in the order of their columns."""
+"""The integrators compared with RK4, in the order of their columns."""
 
 
 def measured(row: Row) -> str:
-    """Return what RK4 measured, with the digits that its bound needs."""
+    """Return the value measured with RK4, with the digits that its bound needs."""
     return _number(row.measured, row)
 
 
 def under(row: Row, integrator: Integrator) -> str:
-    """Return how far the integrator is off the target; nothing where it was not flown."""
+    """Return the integrator's deviation from the target; '' where it was not flown."""
     value = row.others.get(integrator)
     return "" if value is None else f"{abs(value - row.target):.2g}"
 
@@ -31,6 +31,6 @@ def allowed(row: Row) -> str:
 def _number(value: float, row: Row) -> str:
     if row.target == 0.0 or not math.isfinite(value):
         return f"{value:.2g}"
-    # One digit more than the bound can tell apart.
+    # One digit more than the bound resolves.
     digits = 2 + math.floor(math.log10(abs(row.target))) - math.floor(math.log10(row.allowed))
     return f"{value:.{max(digits, 2)}g}"

@@ -1,4 +1,4 @@
-"""Mass properties: a rotor's inertia, and what the wheels leave of the vehicle's for the bus."""
+"""Mass properties: a rotor's, and those of the bus from the vehicle's less its wheels'."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -13,10 +13,10 @@ from mjspace.scenario.plant import PlantTable
 
 
 class Inertial(NamedTuple):
-    """Where a body's mass is: MuJoCo's own fields."""
+    """Mass properties of a body, in MuJoCo's fields."""
 
     mass: float
-    """[kg]"""
+    """Mass [kg]."""
     ipos: Array
     """Centre of mass in the body's axes [m], shape (3,)."""
     inertia: Array
@@ -45,12 +45,12 @@ def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Iner
     imbalance of its ``bearing``.
 
     Static imbalance is an offset of the mass across the axis, dynamic imbalance a product of
-    inertia between the axis and that offset's direction. The axial inertia stays, and so does the
-    transverse one, but for a rotor so flat that its mass has to reach along the axis to be askew.
+    inertia between the axis and that offset's direction. The axial inertia is kept, and so is the
+    transverse one, except for a rotor so flat that its mass has to extend along the axis.
 
     Raises:
-        ValueError: so large a product of inertia that it would change the transverse inertia by
-            more than a hundredth; ``key`` is the bearing's in the scenario.
+        ValueError: the product of inertia would change the transverse inertia by more than a
+            hundredth; ``key`` is the bearing's in the scenario.
     """
     largest = int(np.argmax(np.abs(axis)))
     across = np.eye(3)[(largest + 1) % 3]
@@ -61,7 +61,7 @@ def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Iner
         return body
     frame = np.stack([axis, across, np.cross(axis, across)])
     inertia = frame @ tensor(body.inertia, body.iquat) @ frame.T
-    # Second moments of the mass, which any body has that are positive semidefinite.
+    # Second moments of the mass: those of a real body are positive semidefinite.
     spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     spread[0, 1] = spread[1, 0] = spread[0, 1] - bearing.dynamic_imbalance
     need = spread[0, 1:] @ np.linalg.solve(spread[1:, 1:], spread[0, 1:])
@@ -69,8 +69,8 @@ def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Iner
     if need > allowed:
         most = bearing.dynamic_imbalance * np.sqrt(allowed / need)
         raise ValueError(
-            f"{key}.dynamic_imbalance: {bearing.dynamic_imbalance:g} kg m^2 is more than what "
-            f"turns there can have: {most:.3g} kg m^2"
+            f"{key}.dynamic_imbalance: {bearing.dynamic_imbalance:g} kg m^2 is above the "
+            f"largest possible of the rotating body, {most:.3g} kg m^2"
         )
     spread[0, 0] = max(spread[0, 0], need + 1e-9 * inertia[1, 1])  # rounding must not undo it
     askew = np.trace(spread) * np.eye(3) - spread
@@ -87,7 +87,7 @@ def bus(table: PlantTable, wheels: Rotors, own: Array) -> tuple[Inertial, Array]
     [kg m^2] of a table without one. Wheel imbalance, which turns, is left out of the balance.
 
     Raises:
-        ValueError: the wheels take more than ``gyrostat_inertia`` has.
+        ValueError: the wheels have more inertia than ``gyrostat_inertia``.
     """
     axes, centres = wheels.axes, wheels.centres
     centre = -wheels.mass * centres.sum(axis=0) / table.mass
@@ -114,7 +114,7 @@ def principal(inertia: Array) -> tuple[Array, Array]:
 
 
 def own_inertia(body: Any) -> Array:
-    """Return the inertia matrix (3, 3) [kg m^2] that a body of an ``MjSpec`` has of itself."""
+    """Return the inertia matrix (3, 3) [kg m^2] that a body of an ``MjSpec`` states."""
     if np.isnan(body.fullinertia[0]):
         return tensor(body.inertia, body.iquat)
     xx, yy, zz, xy, xz, yz = body.fullinertia
@@ -122,7 +122,7 @@ def own_inertia(body: Any) -> Array:
 
 
 def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inertial:
-    """Return the bus that makes a vehicle of mass ``whole`` [kg] with ``others``.
+    """Return the bus: a vehicle of mass ``whole`` [kg] less the bodies ``others``.
 
     ``inertia`` (3, 3) [kg m^2] is the vehicle's about the body origin, its centre of mass.
 
@@ -155,7 +155,7 @@ def tensor(inertia: Array, iquat: Array) -> Array:
 
 
 def _point(r: Array) -> Array:
-    """Return the inertia of a unit mass at ``r`` [m] about the origin."""
+    """Return the inertia matrix (3, 3) of a unit mass at ``r`` (3,) [m] about the origin."""
     result: Array = np.dot(r, r) * np.eye(3) - np.outer(r, r)
     return result
 

@@ -1,4 +1,4 @@
-"""Refuses or warns of models that MuJoCo would fly wrongly without saying so."""
+"""Guards: refuses or warns of models that MuJoCo would simulate wrongly without a message."""
 
 import copy
 import warnings
@@ -15,16 +15,16 @@ _FEWEST_STEPS = 10.0  # a revolution: RK4's error of the wobble is 1.7e-4 there
 
 
 class ModelWarning(UserWarning):
-    """The model flies, but not as exactly as it may seem."""
+    """The model is accepted, but its results are less accurate than they seem."""
 
 
 def check(model: Any) -> None:
-    """Refuse or warn of what would be silently wrong in a compiled model.
+    """Refuse or warn of settings of a compiled model that give wrong results silently.
 
     Raises:
-        ValueError: automatic reset, sleep, armature, gravity, or a damper, spring or friction on a
-            free flyer, a step too long for a servo, spring or damper; all of them are named, each
-            with its number and its cure.
+        ValueError: automatic reset, sleep or armature; gravity, or a damper, spring or friction on
+            a free flyer; a step too long for a servo, spring or damper. The message names all of
+            them, each with its number and its cure.
 
     Warns:
         ModelWarning: an integrator other than RK4 for bodies on joints, colliding geometry or a
@@ -57,7 +57,7 @@ def check_imbalance(model: Any, fastest: float) -> None:
     """Warn when the step cannot resolve an imbalanced rotor that turns at ``fastest`` [rad/s].
 
     Warns:
-        ModelWarning: fewer than ten steps a revolution, with the step that would do.
+        ModelWarning: fewer than ten steps per revolution; the message names a suitable step.
     """
     turn = fastest * model.opt.timestep / (2.0 * np.pi)  # revolutions in a step
     if turn <= 1.0 / _FEWEST_STEPS:
@@ -68,8 +68,8 @@ def check_imbalance(model: Any, fastest: float) -> None:
             warnings.warn(
                 f"joint {model.joint(joint).name!r} turns an imbalanced body and has "
                 f"{1.0 / turn:.3g} steps a revolution at {fastest:.4g} rad/s: its wobble is off by "
-                f"{1.4e-4 * (10.5 * turn) ** 4:.1g} or more; a step below "
-                f"{2.0 * np.pi / (_FEWEST_STEPS * fastest):.2g} s would do",
+                f"{1.4e-4 * (10.5 * turn) ** 4:.1g} or more; use a step below "
+                f"{2.0 * np.pi / (_FEWEST_STEPS * fastest):.2g} s",
                 ModelWarning,
                 stacklevel=3,
             )
@@ -78,8 +78,8 @@ def check_imbalance(model: Any, fastest: float) -> None:
 def _autoreset(model: Any) -> Iterator[str]:
     if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET:
         yield (
-            "automatic reset is on: after a state that is not finite MuJoCo would go on from the "
-            'initial one; set <flag autoreset="disable"/>'
+            "automatic reset is on: after a state that is not finite MuJoCo would continue from "
+            'the initial one; set <flag autoreset="disable"/>'
         )
 
 
@@ -111,7 +111,7 @@ def _uniform_gravity(model: Any) -> Iterator[str]:
     if _free(model).any() and np.any(model.opt.gravity) and not off:
         yield (
             f"gravity is {model.opt.gravity} m/s^2 for a free flyer, and uniform: set "
-            f'<option gravity="0 0 0"/>; the environment has the real one'
+            f'<option gravity="0 0 0"/>; a scenario\'s environment has its own gravity'
         )
 
 
@@ -137,9 +137,9 @@ def _stiff_joints(model: Any, linear: Linear | None) -> Iterator[str]:
     step = model.opt.timestep
     mode = stability.growing(linear, step)
     if mode is not None:
-        # What a torque between two bodies has to move: the inertia seen from the joint.
+        # The inertia that a torque between the joint's two bodies moves.
         inertia = 1.0 / np.linalg.inv(linear.inertia)[mode.dof, mode.dof]
-        # Rounding of the numerical slopes is no damping.
+        # Removes the rounding of the numerical slopes.
         damping, stiffness = (
             round(float(matrix[mode.dof, mode.dof]), 9) + 0.0
             for matrix in (linear.damping, linear.stiffness)
@@ -157,8 +157,8 @@ def _driven_joints(model: Any, linear: Linear | None) -> Iterator[str]:
     slopes = np.diag(linear.damping)
     for dof in np.flatnonzero(slopes < -1e-6 * np.abs(linear.damping).max()):
         yield (
-            f"{_joint_name(model, dof)} has damping {slopes[dof]:.4g}: a damper or servo of the "
-            f"wrong sign drives it faster and faster"
+            f"{_joint_name(model, dof)} has damping {slopes[dof]:.4g}: a damper or servo with "
+            f"the wrong sign accelerates it without bound"
         )
 
 
@@ -167,9 +167,9 @@ def _integrator(model: Any) -> Iterator[str]:
     if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4 and jointed:
         name = mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_")
         yield (
-            f"the integrator is {name}, first order: with a wheel of 6 N m s it puts the bus rate "
-            f"10 % off within 100 s at a step of 10 ms, 1 % at 1 ms, where RK4 errs by 1e-11 and "
-            f'less (measured); set integrator="RK4" (rates.integrator in a scenario)'
+            f"the integrator is {name}, first order: with a wheel of 6 N m s the error of the bus "
+            f"rate is 10 % within 100 s at a step of 10 ms, 1 % at 1 ms, and at most 1e-11 with "
+            f'RK4 (measured); set integrator="RK4" (rates.integrator in a scenario)'
         )
 
 
@@ -223,7 +223,7 @@ def _imbalanced(model: Any, joint: int) -> bool:
     mujoco.mju_quat2Mat(principal, model.body_iquat[body])
     in_body = principal.reshape(3, 3)
     product = np.cross(axis, in_body @ (model.body_inertia[body] * (in_body.T @ axis)))
-    # Far below any imbalance that is meant, far above rounding.
+    # Far below any intended imbalance, far above rounding.
     scale = model.body_inertia[body].max()
     return bool(np.linalg.norm(offset) > 1e-12 or np.linalg.norm(product) > 1e-12 * scale)
 

@@ -1,7 +1,7 @@
-"""Whether RK4 is stable at a model's step: its springs, dampers and servos about their rest.
+"""Stability of RK4 at a model's step, with its springs, dampers and servos linearized at rest.
 
 The forces of joints, tendons and actuators are linearized numerically, so that coupled joints,
-tendons and every kind of transmission count.
+tendons and every kind of transmission are included.
 """
 
 import copy
@@ -14,8 +14,8 @@ import numpy as np
 from mjspace.contract import Array
 
 LARGEST = 150
-"""Degrees of freedom up to which a model is linearized: beyond, it takes too long."""
-_NUDGE = 1e-6  # rad, m, and per second: rounding and the forces' curvature both far below
+"""Largest number of degrees of freedom for which a model is linearized, for its computing time."""
+_NUDGE = 1e-6  # rad, m, and per second: the errors by rounding and by curvature are both far below
 _INSIDE = 2.0
 """RK4 is stable for every decaying or undamped mode whose |eigenvalue| x step is below this."""
 
@@ -34,11 +34,11 @@ class Mode:
     """The fastest growing mode of a model under RK4."""
 
     dof: int
-    """The degree of freedom that takes most part in it."""
+    """The degree of freedom with the largest share of its kinetic energy."""
     growth: float
-    """By which factor it grows in each step."""
+    """Growth factor per step."""
     step: float
-    """Below which it would not [s]."""
+    """Step below which it does not grow [s]."""
 
 
 def linearized(model: Any) -> Linear | None:
@@ -46,7 +46,7 @@ def linearized(model: Any) -> Linear | None:
     if not 0 < model.nv <= LARGEST:
         return None
     free = copy.copy(model)
-    # What a servo can give at most is none of its slope.
+    # Limits of forces do not affect the slopes.
     free.actuator_forcelimited[:] = 0
     free.jnt_actfrclimited[:] = 0
     free.tendon_actfrclimited[:] = 0
@@ -69,9 +69,9 @@ def linearized(model: Any) -> Linear | None:
 
 
 def growing(linear: Linear, step: float) -> Mode | None:
-    """Return the mode that RK4 makes grow most at ``step`` [s]; None where all of them decay.
+    """Return the mode that RK4 makes grow most at ``step`` [s]; None where all modes decay.
 
-    Modes that grow by themselves are no fault of the step, and left out.
+    Modes that are unstable themselves, at any step, are left out.
     """
     size = len(linear.inertia)
     accelerated = -np.linalg.solve(linear.inertia, np.hstack([linear.stiffness, linear.damping]))
@@ -84,18 +84,18 @@ def growing(linear: Linear, step: float) -> Mode | None:
     worst = int(np.argmax(growth))
     if growth[worst] <= 1.0 + 1e-9:
         return None
-    # The kinetic energy that each degree of freedom has in it
+    # Kinetic energy of each degree of freedom in the mode
     share = np.abs(vectors[size:, worst]) ** 2 * np.diag(linear.inertia)
     return Mode(int(np.argmax(share)), float(growth[worst]), float(2.78 * step / abs(z[worst])))
 
 
 def inertia_at_joints(model: Any) -> Array:
-    """Return, for each dof, what a torque between the joint's two bodies has to move, (nv,)."""
+    """Return the inertia (nv,) that a torque between the two bodies of each dof's joint moves."""
     return 1.0 / np.diag(np.linalg.inv(mass_matrix(model))) if model.nv else np.zeros(0)
 
 
 def mass_matrix(model: Any) -> Array:
-    """Return the mass matrix (nv, nv), joints at rest."""
+    """Return the mass matrix (nv, nv) at the model's initial position."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     matrix = np.zeros((model.nv, model.nv))

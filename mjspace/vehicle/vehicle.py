@@ -22,7 +22,7 @@ from mjspace.vehicle import composition, indices, mass_properties, model_checks
 
 
 class UnphysicalInertiaWarning(UserWarning):
-    """The bus flies with an inertia that no mass distribution has."""
+    """The inertia of the bus is impossible for a mass distribution, but simulated unchanged."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Vehicle:
 
     model: Any  # the ``mujoco.MjModel``
     inertia: Array
-    """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia,
-    body axes [kg m^2], shape (3, 3); wheel imbalance left out."""
+    """H of the papers: inertia of the whole vehicle about its centre of mass, less the wheels'
+    axial inertia, body axes [kg m^2], shape (3, 3); without wheel imbalance."""
     wheel_axes: Array
     """Unit spin axes, body axes, shape (n, 3)."""
     wheel_inertia: Array
@@ -50,7 +50,7 @@ class Vehicle:
     driven: Driven
     """What of the model its actuators drive, by name."""
     speed_limit: float
-    """Largest wheel speed relative to the bus [rad/s]; inf where there is none."""
+    """Largest wheel speed relative to the bus [rad/s]; inf without a limit."""
     momentum: slice
     """In ``sensordata``: total angular momentum about the centre of mass, inertial [N m s]."""
     kinetic: slice
@@ -65,11 +65,11 @@ class Vehicle:
 
 
 def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
-    """Return the vehicle that ``table`` describes; its state has ``userdata`` numbers of user data.
+    """Return the vehicle that ``table`` describes, with ``userdata`` numbers of user data.
 
     Raises:
-        ValueError: an unknown model or part, wheels that leave no inertia for the bus or that no
-            rotor can be, or what ``guards.check`` refuses.
+        ValueError: an unknown model or part, wheels that leave no inertia for the bus or are
+            impossible as rotors, or a finding of ``model_checks.check``.
 
     Warns:
         UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown unchanged.
@@ -102,7 +102,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
 
 
 def on_model(vehicle: Vehicle, model: Any) -> Vehicle:
-    """Return ``vehicle`` on another compilation of it: the one that a log holds.
+    """Return ``vehicle`` with another compiled model of it, as from a log.
 
     Raises:
         KeyError: ``model`` lacks one of the vehicle's joints or sensors.
@@ -117,12 +117,12 @@ def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
     they hold for wheels anywhere in the bus; where more than three wheels can make it, the least.
 
     Raises:
-        ValueError: not one speed for each wheel, a speed above the limit, a joint that is not
-            there, or a momentum that the wheels' axes cannot make.
+        ValueError: a wrong number of speeds, a speed above the limit, an unknown joint, or a
+            momentum that the wheels' axes do not span.
 
     Warns:
-        guards.ModelWarning: a step too long for imbalanced wheels at the speed limit or, where
-            there is none, at the initial speed.
+        model_checks.ModelWarning: a step too long for imbalanced wheels at the speed limit or,
+            without a limit, at the initial speed.
     """
     data = mujoco.MjData(vehicle.model)
     wheels = vehicle.wheel_dof
@@ -186,7 +186,7 @@ def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
     body.mass, body.ipos, _, body.iquat = inertial
     body.fullinertia = np.full(6, np.nan)  # unset: the principal moments hold
     excess = moments[2] - moments[1] - moments[0]
-    # MuJoCo's compiler refuses what is not physical; its dynamics only need it positive.
+    # MuJoCo's compiler refuses unphysical inertias; its dynamics only need positive ones.
     body.inertia = moments if excess <= 0.0 else np.full(3, moments.mean())
     model = spec.compile()
     if excess > 0.0:
@@ -203,7 +203,7 @@ def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
 
 
 def _others(spec: Any) -> list[mass_properties.Inertial]:
-    """Return what else than the bus has mass, in the bus's axes, joints at rest."""
+    """Return the mass properties of all bodies but the bus, in the bus's axes, joints at rest."""
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -223,7 +223,7 @@ def _others(spec: Any) -> list[mass_properties.Inertial]:
 
 
 def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
-    """Return the wheel speeds [rad/s] for a total ``momentum`` [N m s], inertial axes."""
+    """Return the wheel speeds (n,) [rad/s] for a total ``momentum`` (3,) [N m s], inertial axes."""
     bus = vehicle.model.body("bus").id
     matrix = np.zeros((3, vehicle.model.nv))
     mujoco.mj_fwdPosition(vehicle.model, data)
@@ -236,6 +236,6 @@ def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
         in_body = data.xmat[bus].reshape(3, 3).T @ missing
         raise ValueError(
             f"initial.momentum: the wheels' axes cannot make {in_body} N m s of it (body axes): "
-            f"give wheel_speed, or plant.wheels.axes that span it"
+            f"set wheel_speed instead, or plant.wheels.axes that span it"
         )
     return speeds

@@ -60,7 +60,7 @@ def test_the_verdict_is_the_exit_status(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, passed: bool
 ) -> None:
     row = Row.judged(Bound("x", "", 1.0, "because"), 0.5 if passed else 2.0)
-    injected = Injected(fault="sign", meaning="", wanted=True, broken=["x"] if passed else [])
+    injected = Injected(fault="sign", meaning="", expected=True, broken=["x"] if passed else [])
     section = dict.fromkeys(("title", "shows", "source", "x_label", "y_label", "error_label"), "")
     results = Results(
         versions={},

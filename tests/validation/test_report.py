@@ -27,9 +27,9 @@ SECTION = Section(
         Row.judged(Bound("lost", "rad", 1.0, "finite"), np.nan),
     ],
     faults=[
-        Injected(fault="inertia", meaning="off", wanted=True, broken=["period"]),
-        Injected(fault="held", meaning="held", wanted=False, broken=[]),
-        Injected(fault="sign", meaning="the other way", wanted=True, broken=[]),
+        Injected(fault="inertia", meaning="off", expected=True, broken=["period"]),
+        Injected(fault="held", meaning="held", expected=False, broken=[]),
+        Injected(fault="sign", meaning="the other way", expected=True, broken=[]),
     ],
     x_label="time [s]",
     y_label="rate [rad/s]",
@@ -137,7 +137,7 @@ def test_the_table_says_what_failed(capsys: pytest.CaptureFixture[str]) -> None:
     assert "as a | b" in angle
     (lost,) = (line for line in lines if "lost" in line)
     assert "FAIL" in lost
-    assert any("spin did not notice: the other way" in line for line in lines)
+    assert any("spin did not detect: the other way" in line for line in lines)
     assert any("Not <compared>." in line for line in lines)
 
 
@@ -164,11 +164,11 @@ def cells(lines: list[str], head: str) -> dict[str, dict[str, str]]:
 
 def test_the_table_says_who_caught_which_fault(capsys: pytest.CaptureFixture[str]) -> None:
     """And who missed one, which is not said of a fault that a benchmark does not claim to catch."""
-    more = Injected(fault="armature", meaning="heavy", wanted=False, broken=["angle"])
+    more = Injected(fault="armature", meaning="heavy", expected=False, broken=["angle"])
     other = SECTION.model_copy(update={"name": "other", "faults": [more]})
     none = SECTION.model_copy(update={"name": "none", "faults": []})
     lines = shown(capsys, RESULTS.model_copy(update={"sections": [SECTION, other, none]}))
-    assert lines[-2:] == ["FAIL spin did not notice: the other way", "Not <compared>."]
+    assert lines[-2:] == ["FAIL spin did not detect: the other way", "Not <compared>."]
     assert cells(lines[:-2], "caught faults") == {
         "spin": {
             **dict.fromkeys(("armature", "integrator", "erratum"), ""),
@@ -205,12 +205,12 @@ def test_a_benchmark_is_named_once_and_each_quantity_has_its_verdict(
 def test_brackets_are_no_markup(capsys: pytest.CaptureFixture[str]) -> None:
     """Rich takes what is in brackets for a style, and shows none of it."""
     row = Row.judged(Bound("rate [red]", "", 1.0, "by [bold]"), 0.5)
-    fault = Injected(fault="sign", meaning="[dim]", wanted=True, broken=[])
+    fault = Injected(fault="sign", meaning="[dim]", expected=True, broken=[])
     section = SECTION.model_copy(update={"rows": [row], "faults": [fault]})
     text = "\n".join(
         shown(capsys, RESULTS.model_copy(update={"sections": [section], "remarks": ["see [b]"]}))
     )
-    for part in ("rate [red]", "by [bold]", "did not notice: [dim]", "see [b]"):
+    for part in ("rate [red]", "by [bold]", "did not detect: [dim]", "see [b]"):
         assert part in text
 
 
@@ -268,7 +268,7 @@ def test_only_what_is_judged_stands_out(
 ) -> None:
     """Other integrators are a warning, reasons are dim, and no number in a sentence is colored."""
     terminal(monkeypatch, 160)
-    fault = Injected(fault="sign", meaning="by 3 rad", wanted=True, broken=[])
+    fault = Injected(fault="sign", meaning="by 3 rad", expected=True, broken=[])
     section = SECTION.model_copy(update={"faults": [fault]})
     update = {"sections": [section], "remarks": ["of 3 rad"]}
     lines = shown(capsys, RESULTS.model_copy(update=update))
@@ -277,8 +277,8 @@ def test_only_what_is_judged_stands_out(
     assert re.search(rf"{re.escape(DIM)}as a \| b", angle)
     assert not re.search(r"\x1b[^m]*m *2e-12", angle)
     assert "of 3 rad" in lines
-    (missed,) = (line for line in lines if "did not notice" in line)
-    assert missed.endswith(" spin did not notice: by 3 rad")
+    (missed,) = (line for line in lines if "did not detect" in line)
+    assert missed.endswith(" spin did not detect: by 3 rad")
 
 
 ROWS = [

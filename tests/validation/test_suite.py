@@ -308,7 +308,7 @@ def test_every_benchmark_holds_and_catches_exactly_what_it_claims() -> None:
     results = suite.validate(suite.chosen([]))
     for section in results.sections:
         assert [row for row in section.rows if not row.passed] == []
-        assert [i for i in section.faults if i.wanted != bool(i.broken)] == [], section.name
+        assert [i for i in section.faults if i.expected != bool(i.broken)] == [], section.name
     assert results.passed
     injected: list[Injected] = [i for section in results.sections for i in section.faults]
     for fault in FAULTS:

@@ -123,7 +123,7 @@ def test_wheels_too_far_out_are_refused() -> None:
         ({"transverse_inertia": 0.02}, "less than half the axial"),
         (
             {"dynamic_imbalance": 0.02},
-            r"plant\.wheels\.dynamic_imbalance: 0\.02 .* can have: 0\.0025 kg",
+            r"plant\.wheels\.dynamic_imbalance: 0\.02 .* rotating body, 0\.0025 kg",
         ),
     ],
 )

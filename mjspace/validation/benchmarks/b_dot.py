@@ -30,22 +30,22 @@ STRENGTH = 7.7e15  # T m^3: the Earth's
 RADIUS = (GM["earth"] / RATE**2) ** (1 / 3)  # m
 FIELD = STRENGTH / RADIUS**3  # T, on the equator
 
-BALL = 10.0  # kg m^2: as inert about every axis, so that the averages have closed forms
+BALL = 10.0  # kg m^2, equal about every axis, so that the averages have closed forms
 TUMBLE = np.array([0.03, 0.02, -0.025])  # rad/s
 ORBITS = 6  # in which the fastest component falls to 1/e of itself
 GAIN = BALL / (2.5 * FIELD**2 * ORBITS * PERIOD)  # A m^2 s/T
 
-BODY = np.array([12.0, 14.0, 5.0])  # kg m^2, in a field that stays
+BODY = np.array([12.0, 14.0, 5.0])  # kg m^2, in a constant field
 STAYS = np.array([1.2e-5, -2.5e-5, 0.8e-5])  # T
 FAST = np.array([0.1, -0.25, 0.2])  # rad/s
-STRONG = 0.2 / float(STAYS @ STAYS)  # A m^2 s/T: gone in a minute
+STRONG = 0.2 / float(STAYS @ STAYS)  # A m^2 s/T: the tumble stops within a minute
 TIMES_FASTER = 500.0  # than along the orbit: 10 ms there for 5 s here
 
 
 def exact_rates(time: Array) -> Array:
     """Return the ball's rates (n, 3) [rad/s], inertial axes, over the poles in the x-z plane.
 
-    By DOP853 of I w' = -k (dB/dt - w x B) x B, which knows no attitude.
+    By DOP853 of I w' = -k (dB/dt - w x B) x B, independent of the attitude.
     """
 
     def slope(at: float, w: Array) -> list[float]:
@@ -64,7 +64,7 @@ def exact_rates(time: Array) -> Array:
 def averaged_rates(orbits: int) -> Array:
     """Return the rates (3,) [rad/s] after whole orbits, by the torque's average over each.
 
-    In units of k B0^2 / I the fields give the decay; the field turns at 1.8 n, which is left.
+    In units of k B0^2 / I the fields give the decay; the field rotates at 1.8 n, the final rate.
     """
     decay = np.exp(-np.array([1.375, 2.5, 1.125]) / 2.5 * orbits / ORBITS)
     left = np.array([0.0, -1.8 * RATE, 0.0])
@@ -72,7 +72,7 @@ def averaged_rates(orbits: int) -> Array:
 
 
 def exact_tumble(time: Array) -> Array:
-    """Return the attitudes (n, 4) of the body in the field that stays, by DOP853."""
+    """Return the attitudes (n, 4) of the body in the constant field, by DOP853."""
 
     I1, I2, I3 = BODY.tolist()
     bx, by, bz = STAYS.tolist()
@@ -99,7 +99,7 @@ def exact_tumble(time: Array) -> Array:
 
 
 def fly(conditions: Conditions) -> Readings:
-    """Detumble a ball over six orbits, and a body in a field that stays within a minute."""
+    """Detumble a ball over six orbits, and a body in a constant field within a minute."""
     sign = -1.0 if conditions.fault == "sign" else 1.0
     orbit = kepler.pack(Orbit(semi_major_axis=RADIUS, inclination=0.5 * np.pi))
 
@@ -133,7 +133,7 @@ def fly(conditions: Conditions) -> Readings:
 
 
 def _residual(rates: Array) -> float:
-    """Return where three rates about y, whole orbits apart, tend to: over n, the field's way.
+    """Return the limit of three rates about y, whole orbits apart, over n, in the field's sense.
 
     About y the motion is linear and periodic by itself, so that each is an affine map of the last.
     """
@@ -168,8 +168,8 @@ BENCHMARKS = (
         name="b-dot",
         title="Detumbling in the Earth's magnetic field",
         shows=(
-            "Magnetorquers that oppose the field's change stop a tumble as fast as theory says, "
-            "and leave 1.8 turns an orbit with the field. MuJoCo follows when the torque is "
+            "Magnetorquers that oppose the field's change stop a tumble as fast as theory "
+            "predicts, down to 1.8 turns an orbit with the field. MuJoCo agrees if the torque is "
             "evaluated in every stage."
         ),
         source=(
@@ -202,7 +202,7 @@ BENCHMARKS = (
                 "attitude",
                 "rad",
                 1e-11,
-                "a minute at 0.3 rad/s in a field that stays, 10 ms: w t (w h)^4 / 120 is 1e-11; "
+                "a minute at 0.3 rad/s in a constant field, 10 ms: w t (w h)^4 / 120 is 1e-11; "
                 "6e-13 measured",
             ),
             Bound(

@@ -1,4 +1,4 @@
-"""Booms that grow out of a spinning bus: it slows down, level or nutating."""
+"""Booms deployed from a spinning bus, which slows down: pure spin, and nutation."""
 
 from typing import Any
 
@@ -46,13 +46,13 @@ def exact_spin(time: Array) -> tuple[Array, Array]:
 
 
 def exact_work() -> float:
-    """Return what the drives do on the way out [J]: the kinetic energy's change, H (w - w0) / 2."""
+    """Return the drives' work [J]: the change of kinetic energy, H (w - w0) / 2."""
     rate = exact_spin(np.array([0.0, DURATION]))[0]
     return float(0.5 * (INERTIA[2] + 2.0 * TIP * STOWED**2) * rate[0] * (rate[1] - rate[0]))
 
 
 def exact_nutation(time: Array) -> tuple[Array, Array]:
-    """Return rates (n, 3) [rad/s] and attitudes (n, 4), by an integration of our own.
+    """Return rates (n, 3) [rad/s] and attitudes (n, 4), by an independent integration.
 
     Euler's equations with I(t) = I0 + 2 m r^2 diag(0, 1, 1), the booms along x:
     I w' = -I' w - w x (I w).
@@ -113,7 +113,7 @@ def deploy_nutating(conditions: Conditions) -> Readings:
 
 
 def _fly(conditions: Conditions, rate: Array) -> stand.Record:
-    """Deploy both booms evenly: the drives hold them against the centrifugal pull, no more."""
+    """Deploy both booms at constant speed: the drives balance the centrifugal force."""
     model = stand.build(conditions, "boom")
     data = stand.start(model)
     data.qvel[3:6] = rate
@@ -139,9 +139,9 @@ BENCHMARKS = (
         name="boom",
         title="Booms deployed on a spinning bus",
         shows=(
-            "A bus that grows slows down as its momentum says, and its drives are charged the "
-            "right work: MuJoCo may be trusted with masses that move far. Euler's total momentum "
-            "is off by 4 parts in 10 000, though nothing outside acts."
+            "A deploying bus slows down as its momentum requires, and the drives' work is right: "
+            "MuJoCo is accurate for masses that move far. Euler's total momentum is off by 4 parts "
+            "in 10 000 without an external torque."
         ),
         source="classic closed form, derived here: H = (I0 + 2 m r^2) w with r = r0 + v t",
         step=0.01,
@@ -172,8 +172,8 @@ BENCHMARKS = (
         name="boom-nutation",
         title="Booms deployed on a nutating bus",
         shows=(
-            "The same out of the plane: moments of inertia that change while the bus nutates. "
-            "MuJoCo gets its changing inertia from the bodies, nobody has to write I'(t)."
+            "The same in three dimensions: moments of inertia that change while the bus nutates. "
+            "MuJoCo computes the changing inertia from the bodies; I'(t) need not be written."
         ),
         source="Euler's equations with a moment of inertia that changes, integrated independently",
         step=0.01,

@@ -54,7 +54,7 @@ class Tube:
         return BUS_MASS * self.mass / (BUS_MASS + self.mass)
 
     def adapt(self, spec: Any) -> None:
-        """Give the model these numbers."""
+        """Set these parameters in a ``MjSpec``."""
         spec.body("bus").inertia = self.bus
         spec.body("damper_ball").mass = self.mass
         spec.joint("damper_slide").stiffness[0] = self.stiffness
@@ -100,7 +100,7 @@ class Ring:
         return h1, h2, h3
 
     def adapt(self, spec: Any) -> None:
-        """Give the model these numbers."""
+        """Set these parameters in a ``MjSpec``."""
         ring = self.axial * np.array([1.0, 0.5, 0.5])
         spec.body("bus").inertia = np.array(self.whole) - ring
         spec.body("damper_ring").inertia = ring[::-1]
@@ -190,9 +190,9 @@ BENCHMARKS = (
         name="tube-damper",
         title="Nutation damper: a ball in a tube",
         shows=(
-            "A damper steadies spin about the major axis and drives spin about the minor axis "
-            "away from it, each with its exact time constant. Where that is 171 s, Euler's own "
-            "growth of nutation makes it 1290 s at 10 ms, and implicit's own decay 92 s."
+            "A damper stabilizes spin about the major axis and destabilizes spin about the minor "
+            "axis, each with its exact time constant. Where that is 171 s, Euler's own growth of "
+            "nutation makes it 1290 s at 10 ms, and implicit's own decay 92 s."
         ),
         source=(
             "The damper is Hughes, Spacecraft Attitude Dynamics, 1986, chapter 5; "
@@ -222,8 +222,8 @@ BENCHMARKS = (
         name="ring-damper",
         title="Nutation damper: a ring of fluid",
         shows=(
-            "The same with a body that turns against friction: its hinge's damping takes energy "
-            "and no momentum."
+            "The same with a body that rotates against viscous friction: its hinge's damping "
+            "dissipates energy and conserves momentum."
         ),
         source=(
             "The damper is Wertz, Spacecraft Attitude Determination and Control, 1978, section "

@@ -1,4 +1,4 @@
-"""Which bodies gravity's gradient holds upright: the Lagrange and DeBra-Delp regions."""
+"""Bodies that the gravity gradient stabilizes upright: the Lagrange and DeBra-Delp regions."""
 
 from typing import Any
 
@@ -33,8 +33,8 @@ SHAPES = np.array(
     ]
 )
 ROLL = 10.0  # kg m^2
-SMALL = 1e-7  # rad: what is not linear, of second order, is as much of it
-GROWS = 0.01  # of the orbital rate: slower growth is none
+SMALL = 1e-7  # rad: second-order terms are 1e-7 of it
+GROWS = 0.01  # of the orbital rate: slower growth counts as none
 INTERVAL, SAMPLES = 80.0, 70  # s, and how many: 98 % of an orbit
 
 
@@ -69,7 +69,7 @@ def linear(inertia: Array) -> Array:
 
 
 def fly(conditions: Conditions) -> Readings:
-    """Let go each shape beside its upright attitude, and see which stay."""
+    """Release each shape near its upright attitude and find which remain there."""
     flown = [_let_go(conditions, inertia(*shape)) for shape in SHAPES]
     growth = np.array([found.real.max() for found, _ in flown]) / RATE
     exact = [np.linalg.eigvals(linear(inertia(*shape))).real.max() / RATE for shape in SHAPES]
@@ -87,7 +87,7 @@ def fly(conditions: Conditions) -> Readings:
 
 
 def _let_go(conditions: Conditions, moments: Array) -> tuple[Array, Array]:
-    """Return the eigenvalues [1/s] of a flight beside the upright, and how it leaves the theory."""
+    """Return the eigenvalues [1/s] of a flight near upright, and its relative error (n,)."""
 
     def reshape(spec: Any) -> None:
         spec.body("bus").inertia = moments
@@ -100,8 +100,8 @@ def _let_go(conditions: Conditions, moments: Array) -> tuple[Array, Array]:
     step, exact = expm(INTERVAL * linear(moments)), [begin]
     for _ in range(SAMPLES):
         exact.append(step @ exact[-1])
-    wanted = np.array(exact) / [1.0, 1.0, 1.0, RATE, RATE, RATE]
-    departure = np.linalg.norm(states - wanted, axis=1) / np.linalg.norm(wanted, axis=1)
+    theory = np.array(exact) / [1.0, 1.0, 1.0, RATE, RATE, RATE]
+    departure = np.linalg.norm(states - theory, axis=1) / np.linalg.norm(theory, axis=1)
     return eigenvalues(states, INTERVAL), departure
 
 
@@ -128,11 +128,11 @@ def _dots(growth: Array) -> tuple[Curve, Curve]:
 BENCHMARKS = (
     Benchmark(
         name="debra-delp",
-        title="Which shapes gravity's gradient holds upright",
+        title="Shapes that the gravity gradient stabilizes upright",
         shows=(
             "On both sides of every border of the Lagrange and DeBra-Delp regions MuJoCo's "
-            "satellite stays or falls as the theory says, and falls as fast; first-order "
-            "integrators damp or feed the motion by n h / 2."
+            "satellite is stable or falls as the theory predicts, and falls as fast; first-order "
+            "integrators damp or excite the motion by n h / 2."
         ),
         source=(
             "DeBra and Delp, Rigid body attitude stability and natural frequencies in a circular "
@@ -145,8 +145,8 @@ BENCHMARKS = (
                 "growth",
                 "of the orbital rate",
                 5e-6,
-                "10 s is 1/90 rad of the orbit: RK4's (2 n h)^4 / 120 is 2e-9; what is not linear "
-                "in 1e-7 rad has grown to 5e-7, measured",
+                "10 s is 1/90 rad of the orbit: RK4's (2 n h)^4 / 120 is 2e-9; nonlinear "
+                "terms at 1e-7 rad have grown to 5e-7, measured",
             ),
             Bound("motion", "of itself", 5e-6, "as the growth; 4e-7 measured"),
         ),

@@ -25,7 +25,7 @@ from mjspace.validation.dgvscmg_equations import NONE
 
 BUS = np.array([[10.5, 0.22, 0.47], [0.22, 12.5, 0.36], [0.47, 0.36, 13.6]])  # kg m^2
 THESIS = dgvscmg.Vehicle(BUS, 0.001 * np.eye(3), 0.001 * np.eye(3), 0.016 * np.eye(3))
-# Gimbals so heavy, and so unlike about their axes, that every term counts.
+# Heavy gimbals with different principal moments, so that every term matters.
 UNLIKE = dgvscmg.Vehicle(
     BUS, np.diag([0.30, 0.20, 0.15]), np.diag([0.12, 0.20, 0.25]), np.diag([0.016, 0.009, 0.009])
 )
@@ -33,14 +33,14 @@ ATTITUDE = attitude.from_mrp(np.array([0.4, -0.3, 0.2]))
 RATE = np.array([-0.1, -0.05, 0.2])  # rad/s
 DRIVEN = np.array([0.01, -0.05, 73.0])  # rad/s, of outer gimbal, inner gimbal and wheel
 FREE = np.array([0.01, -0.05, 20.0])  # rad/s, at the start
-GAIN = 0.2  # N m s/rad and N m/rad, of a gimbal's servo: open loop it would run away
+GAIN = 0.2  # N m s/rad and N m/rad, of a gimbal's servo: the open loop is unstable
 STRIDE = 0.2  # s, between the knots of the torques: slow, so that degree 7 is exact to rounding
 
 
 def exact(
     accelerations: Callable[[Array], Array], joint_rates: Array, duration: float
 ) -> Callable[[Array], Array]:
-    """Return the motion, states (n, 13) at times (n,), that has ``accelerations(state)`` (6,)."""
+    """Return the states (n, 13) at times (n,) of the motion with ``accelerations(state)`` (6,)."""
     solution = solve_ivp(
         lambda _, y: dgvscmg.derivative(y, accelerations(y)),
         (0.0, duration),
@@ -54,9 +54,9 @@ def exact(
 
 
 def printed_slip(vehicle: dgvscmg.Vehicle, y: Array) -> Array:
-    """Return the torque (3,) [N m] that (2.47) adds as printed, by taking M_b w where M w belongs.
+    """Return the error (3,) [N m] of (2.47) as printed, with M_b w instead of M w.
 
-    E1 of the corrections: w x (M_go + M_gi + M_w) w is missing.
+    Erratum E1: w x (M_go + M_gi + M_w) w is missing.
     """
     mass, _ = dgvscmg.balance(vehicle, y)
     return dgvscmg.cross_matrix(y[7:10]) @ (mass[:3, :3] - vehicle.bus) @ y[7:10]
@@ -74,30 +74,30 @@ def drive(conditions: Conditions, vehicle: dgvscmg.Vehicle) -> Readings:
     knots = np.linspace(0.0, duration, round(duration / STRIDE) + 1)
     torque = make_interp_spline(knots, [driven(y)[1] for y in motion(knots)], k=7)
     half = 0.5 * conditions.step
-    wanted = torque(half * np.arange(round(duration / half) + 1))
+    theory = torque(half * np.arange(round(duration / half) + 1))
 
     def motors(_: Any, data: Any, time: float) -> Array:
         force = np.zeros(9)
-        force[6:] = wanted[round(time / half)]
+        force[6:] = theory[round(time / half)]
         force[6:8] += GAIN * (DRIVEN[:2] * (1.0 + time) - data.qpos[7:9] - data.qvel[6:8])
         return force
 
-    record, felt = _fly(conditions, vehicle, DRIVEN, duration, motors)
-    wanted = wanted[: 2 * len(felt) : 2]
-    few = slice(None, None, max(1, len(felt) // 200))
-    begin = conditions.step * np.arange(len(felt), dtype=np.float64)
+    record, measured = _fly(conditions, vehicle, DRIVEN, duration, motors)
+    theory = theory[: 2 * len(measured) : 2]
+    few = slice(None, None, max(1, len(measured) // 200))
+    begin = conditions.step * np.arange(len(measured), dtype=np.float64)
     off, values = _compare(record, motion(record.time))
     return Readings(
-        values=values | {"joint torque": float(np.abs(felt - wanted).max())},
+        values=values | {"joint torque": float(np.abs(measured - theory).max())},
         motion=Picture.of(
-            "motor torque [N m]", begin[few], "outer inner", wanted[few, :2], felt[few, :2]
+            "motor torque [N m]", begin[few], "outer inner", theory[few, :2], measured[few, :2]
         ),
         error=off,
     )
 
 
 def release(conditions: Conditions) -> Readings:
-    """Leave the unlike gimbals and the wheel to themselves."""
+    """Fly gimbals with different principal moments, and the wheel, without motors."""
 
     def free(y: Array) -> Array:
         erratum = conditions.fault == "erratum"
@@ -146,15 +146,15 @@ def _fly(
     data = stand.start(model)
     data.qpos[3:7] = ATTITUDE
     data.qvel[3:9] = *RATE, *joint_rates
-    felt = []
+    measured = []
 
-    def feel(_: Any, data: Any, time: float) -> None:
-        # Sensors are those of the start of the step before; at the start there was none.
+    def read_sensors(_: Any, data: Any, time: float) -> None:
+        # Sensors are of the start of the previous step; there is none at the first.
         if time > 0.0:
-            felt.append(data.sensordata[[2, 4, 6]])  # outer z, inner y, wheel x
+            measured.append(data.sensordata[[2, 4, 6]])  # outer z, inner y, wheel x
 
-    record = stand.fly(conditions, model, data, duration, load=motors, before_step=feel)
-    return record, np.array(felt)
+    record = stand.fly(conditions, model, data, duration, load=motors, before_step=read_sensors)
+    return record, np.array(measured)
 
 
 _SOURCE = (
@@ -168,8 +168,8 @@ BENCHMARKS = (
         title="Double-gimbal variable-speed CMG, driven",
         shows=(
             "The flight of the thesis that derives the equations, its Table 2.1: the gimbals turn "
-            "at constant rates, through the singularity at 90 deg, and the motors bear what the "
-            "equations say."
+            "at constant rates, through the singularity at 90 deg, and the motors' torques are "
+            "those of the equations."
         ),
         source=_SOURCE.format("(2.47), (2.48) and the torques under (2.62)"),
         step=0.005,
@@ -194,10 +194,11 @@ BENCHMARKS = (
     ),
     Benchmark(
         name="unlike-gimbals",
-        title="Driven gimbals that are unlike about their axes",
+        title="Driven gimbals with different principal moments",
         shows=(
-            "The gimbals of the thesis are alike about every axis, where its equation as printed "
-            "and the corrected one agree. These are not: the printed one is off by 0.4 deg in 15 s."
+            "The thesis' gimbals have equal principal moments, for which the printed equation and "
+            "the corrected one agree. With different ones the printed one is off by 0.4 deg in 15 "
+            "s."
         ),
         source=_SOURCE.format("(2.47), (2.48) and the torques under (2.62)"),
         step=0.01,
@@ -218,10 +219,10 @@ BENCHMARKS = (
     ),
     Benchmark(
         name="free-gimbals",
-        title="Double gimbal left to itself",
+        title="Double gimbal without motors",
         shows=(
             "Without motors the wheel keeps its direction, the gimbals swing as the bus tumbles "
-            "round it, and nothing hides an error: armature on a gimbal costs degrees."
+            "around it, and errors are not hidden by a servo: armature on a gimbal causes degrees."
         ),
         source=_SOURCE.format("(2.47), (2.48) and the torques under (2.62), all zero"),
         step=0.01,

@@ -35,7 +35,7 @@ def stiffness(inertia: Array, spin: float, momentum: float) -> tuple[float, floa
 
 
 def dual_spin(conditions: Conditions) -> Readings:
-    """Nudge a spinning bus that its wheel makes stiff, and one that its wheel makes unstable."""
+    """Perturb a spinning bus that its wheel stabilizes, and one that its wheel destabilizes."""
 
     def nudged(spin: float, momentum: float) -> tuple[stand.Record, Array, float, float]:
         model = stand.build(conditions, "bus_wheel")
@@ -94,7 +94,7 @@ BENCHMARKS = (
                 "divergence",
                 "1/s",
                 1e-10,
-                "what the linear equations leave out, (nudge e^2.7 / spin)^2; 6e-12 measured",
+                "terms beyond the linear equations, (nudge e^2.7 / spin)^2; 6e-12 measured",
             ),
             Bound("momentum", "of the bus", 1e-12, "rounding; 5e-14 measured"),
         ),

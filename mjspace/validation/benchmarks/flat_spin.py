@@ -1,4 +1,4 @@
-"""Flat spin: what spins about its minor axis and loses energy ends up about its major axis."""
+"""Flat spin: a body that spins about its minor axis and dissipates ends about its major axis."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from mjspace.validation.benchmark import (
 )
 from mjspace.validation.benchmarks.dampers import Ring, nutation
 
-RING = Ring((12.0, 12.5, 8.0), axial=1.8, damping=1.08)  # as six of the part, to be over it soon
+RING = Ring((12.0, 12.5, 8.0), axial=1.8, damping=1.08)  # six times the part, for a fast transition
 INERTIA = np.array(RING.whole)  # kg m^2
 RATE = np.array([0.02, 0.0, 2.0])  # rad/s: the momentum is 0.86 degrees off the minor axis
 DURATION, HALFWAY = 200, 66  # s, sampled every second
@@ -26,7 +26,7 @@ ENERGY_LOSS = float(1.0 - INERTIA.max() * FLAT_RATE**2 / (INERTIA @ RATE**2))
 
 
 def fall_over(conditions: Conditions) -> Readings:
-    """Fly from one spin to the other; even a short flight must get there."""
+    """Fly from one spin to the other; a short flight completes the transition, too."""
     model = stand.build(conditions, RING.model, adapt=RING.adapt)
     data = stand.start(model)
     data.qvel[3:6] = RATE
@@ -60,9 +60,9 @@ BENCHMARKS = (
         name="flat-spin",
         title="Flat spin, as of Explorer 1",
         shows=(
-            "What loses energy but no momentum falls over from minor to major axis, and where it "
-            "ends follows from momentum alone. Other integrators end there too, but with 2 % of "
-            "the momentum gone wrong."
+            "A body that loses energy but no momentum changes its spin from minor to major axis, "
+            "and its final state follows from momentum alone. Other integrators end there, too, "
+            "but with an error of 2 % of the momentum."
         ),
         source=(
             "Hughes, Spacecraft Attitude Dynamics, 1986, chapter 5; "

@@ -1,4 +1,4 @@
-"""Attitude from shape: an arm, and two wheels, that go round a loop and leave their bus turned."""
+"""Attitude by shape change: an arm, and two wheels, whose closed loop rotates their bus."""
 
 from math import cos, pi, sin
 from typing import Any
@@ -22,7 +22,7 @@ MASS = np.array([50.0, 6.0, 4.0])  # kg: base, upper arm, forearm
 SHOULDER, UPPER, FORE = 0.5, 1.2, 1.0  # m: from the base's centre of mass; lengths
 INERTIA = np.array([8.0, 6.0 * UPPER**2 / 12.0, 4.0 * FORE**2 / 12.0])  # kg m^2; thin rods
 LOOP = 20.0  # s, from rest to rest
-STIFFNESS, DAMPING = 4.0, 4.0  # 1/s^2 and 1/s: joint errors die critically damped, at 2 rad/s
+STIFFNESS, DAMPING = 4.0, 4.0  # 1/s^2 and 1/s: joint errors decay critically damped, at 2 rad/s
 START = np.array([1.5, 0.5])  # rad, shoulder and elbow: 0.8 + 0.7 cos u and 0.5 + 0.9 sin u
 
 WHEEL = 0.05  # kg m^2, axial
@@ -46,7 +46,7 @@ METRIC = _metric()
 
 
 def quintic(x: Any) -> tuple[Any, Any, Any]:
-    """Return the way from rest to rest at ``x``, 0 to 1, its slope and its curvature; any shape."""
+    """Return a path from rest to rest at ``x``, 0 to 1, and its first two derivatives."""
     y = x * (1.0 - x)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * y * y, 60.0 * y * (1.0 - 2.0 * x)
 
@@ -75,7 +75,7 @@ def base_angle(phases: Array) -> Array:
 def joint_torques(
     q1: float, q2: float, w: float, d1: float, d2: float, a1: float, a2: float
 ) -> tuple[float, float]:
-    """Return the torques [N m] that give the joints accelerations ``a1``, ``a2`` [rad/s^2].
+    """Return the joint torques [N m] for the joint accelerations ``a1``, ``a2`` [rad/s^2].
 
     Lagrange's equations of the three angles; the base's acceleration follows, for nothing pushes
     the whole. ``w`` is the base's rate, ``d1`` and ``d2`` are the joints' [rad/s].
@@ -93,7 +93,7 @@ def joint_torques(
 
 
 def fly_arm(conditions: Conditions) -> Readings:
-    """Drive the arm round its loop by computed torque, three times in a minute."""
+    """Move the arm around its loop by computed torque, three times in a minute."""
     loops = 1 if conditions.short else 3
     direction = -1.0 if conditions.fault == "sign" else 1.0
     torque = np.zeros(8)
@@ -135,7 +135,7 @@ def fly_arm(conditions: Conditions) -> Readings:
 
 
 def wheel_attitude(progress: Array) -> Array:
-    """Return attitudes (n, 4) where the wheels have made ``progress`` (n,) of their 4 turns.
+    """Return attitudes (n, 4) at the ``progress`` (n,) of the wheels, 0 to 4 turns.
 
     Without momentum the bus turns by -Jw / I of a wheel's own turn, about that wheel's axis.
     """
@@ -149,7 +149,7 @@ def wheel_attitude(progress: Array) -> Array:
 
 
 def wheel_turn(turn: int) -> float:
-    """Return how far [rad] that turn of a wheel goes: two forth, two back."""
+    """Return the angle [rad] of that turn of a wheel: two forwards, two back."""
     return TURN if turn < 2 else -TURN
 
 
@@ -190,9 +190,9 @@ BENCHMARKS = (
         name="floating-arm",
         title="Free-floating arm",
         shows=(
-            "A robot arm that is back where it was has turned its satellite by 3.7 degrees, "
-            "however slowly it went: attitude without torque. Held over a step, torques are "
-            "1e-4 rad off on the way, and Euler makes momentum out of nothing."
+            "A robot arm that returns to its initial pose has rotated its satellite by 3.7 "
+            "degrees, at any speed: attitude without external torque. Torques held over a step "
+            "cause errors of 1e-4 rad on the way, and Euler creates momentum."
         ),
         source=(
             "Papadopoulos and Dubowsky, On the nature of control algorithms for free-floating "
@@ -219,8 +219,8 @@ BENCHMARKS = (
         name="wheel-loop",
         title="Two wheels round a loop",
         shows=(
-            "Two reaction wheels that turn forth and back, one after the other, leave their "
-            "satellite turned about an axis that neither has: rotations do not commute."
+            "Two reaction wheels that turn forwards and back, one after the other, rotate their "
+            "satellite about an axis that is neither wheel's: rotations do not commute."
         ),
         source="classic closed form, derived here: w = -Jw/I of the wheel's speed without momentum",
         step=0.01,

@@ -1,4 +1,4 @@
-"""A satellite turned by gravity's gradient: how it librates, large and small."""
+"""Libration of a satellite under the gravity gradient, with large and small amplitudes."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ ORBIT = Orbit(semi_major_axis=(GM["earth"] / RATE**2) ** (1 / 3), inclination=TI
 
 INERTIA = np.array([12.0, 14.0, 5.0])  # kg m^2: about roll, pitch, yaw
 RELEASE = np.array([0.3, 0.4, -0.3])  # rad, a rotation vector from LVLH; at rest in LVLH
-SMALL = 1e-5  # rad: what is not linear is 1e-10 of it
+SMALL = 1e-5  # rad: nonlinear terms are 1e-10 of it
 SWING = np.radians(30.0)
 
 
@@ -101,9 +101,9 @@ def exact_libration(release: Array, time: Array) -> Array:
 
 
 def eigenvalues(states: Array, interval: float) -> Array:
-    """Return those [1/s] of the linear motion whose ``states`` (n, k) ``interval`` [s] apart it is.
+    """Return the eigenvalues [1/s] of a linear motion from its ``states`` (n, k).
 
-    By least squares of the matrix that takes one state to the next: no theory enters.
+    The states are ``interval`` [s] apart. Least squares of the transition matrix, without theory.
     """
     scaled = states / np.abs(states).max(axis=0)
     step, *_ = np.linalg.lstsq(scaled[:-1], scaled[1:], rcond=None)
@@ -125,7 +125,7 @@ def roll_yaw_frequencies() -> Array:
 
 
 def fly(conditions: Conditions) -> Readings:
-    """Let the satellite go four ways and compare each with what mechanics says."""
+    """Release the satellite from four states and compare each flight with the exact motion."""
     model = stand.build(conditions, "orbiter", outside=Environment(orbit=ORBIT))
     duration = (0.5 if conditions.short else 2.0) * ORBIT_PERIOD
     time, q, rate = librate(conditions, model, np.concatenate([RELEASE, np.zeros(3)]), duration)
@@ -159,7 +159,7 @@ def _jacobi(q: Array, rate: Array) -> Array:
 
 
 def _swing(conditions: Conditions, model: Any) -> float:
-    """Return the measured period [s] of pitch, let go at 30 deg: twice from zero to zero."""
+    """Return the measured period [s] of pitch, released at 30 deg: twice from zero to zero."""
     state = np.array([0.0, SWING, 0.0, 0.0, 0.0, 0.0])
     duration = 0.8 * swing_period(SWING)
     samples = round(duration / conditions.step)
@@ -183,11 +183,10 @@ def _frequencies(conditions: Conditions, model: Any, axes: list[int]) -> Array:
 BENCHMARKS = (
     Benchmark(
         name="gravity-gradient",
-        title="Libration under gravity's gradient",
+        title="Libration under the gravity gradient",
         shows=(
-            "The native gravity gradient, evaluated in every stage of RK4, carries a satellite "
-            "through two orbits of wide libration to rounding. A torque held over the step loses "
-            "nine digits."
+            "With the native gravity gradient, evaluated in every stage of RK4, two orbits of "
+            "large libration are exact to rounding. A torque held over the step loses nine digits."
         ),
         source=(
             "Euler's equations by DOP853 at 1e-13; frequencies and the pendulum of pitch: Hughes, "
@@ -214,7 +213,7 @@ BENCHMARKS = (
                 "pitch",
                 "of the orbital rate",
                 1e-9,
-                "what is not linear in 1e-5 rad is 1e-10, and so is its rounding; 1e-10 measured",
+                "nonlinear terms at 1e-5 rad are 1e-10, and so is rounding; 1e-10 measured",
                 2.0 * np.pi / swing_period(0.0) / RATE,
             ),
             Bound(

@@ -52,7 +52,7 @@ def exact_jitter(angle: Array) -> tuple[Array, Array]:
 
 
 def jitter(conditions: Conditions) -> Readings:
-    """Weigh the turning wheel on a clamped bus; then let the bus go and watch it shake."""
+    """Measure the rotating wheel's force on a clamped bus, then the jitter of the free bus."""
     angle, load = _weigh(conditions)
     force, torque = exact_load(angle)
     record = _shake(conditions)
@@ -60,7 +60,7 @@ def jitter(conditions: Conditions) -> Readings:
     displacement, tilt = exact_jitter(SPEED * time)
     moved = record.qpos[:, :2] @ [1.0, 1j]
     tilted = attitude.to_rotation_vector(record.qpos[:, 3:7])[:, :2] @ [1.0, 1j]
-    # Beside the jitter there may be a drift, and nutation at Jw W / It.
+    # The motion is jitter, drift, and nutation at Jw W / It.
     steady = np.ones_like(turn)
     nutation = np.exp(1j * AXIAL * SPEED / TRANSVERSE * time)
     shaken, _, _ = _amplitudes(moved, turn, steady, time)
@@ -99,7 +99,7 @@ def _weigh(conditions: Conditions) -> tuple[Array, Array]:
     readings = []
 
     def read(_: Any, data: Any, time: float) -> None:
-        # Sensors are those of the start of the step before; at the start there was none.
+        # Sensors are of the start of the previous step; there is none at the first.
         if time > 0.0:
             readings.append(data.sensordata.copy())
 
@@ -108,13 +108,13 @@ def _weigh(conditions: Conditions) -> tuple[Array, Array]:
 
 
 def _shake(conditions: Conditions) -> stand.Record:
-    """Fly the free bus from where its jitter alone would have it."""
+    """Fly the free bus, starting on its steady jitter."""
     model = _model(conditions, clamped=False)
     data = stand.start(model)
     (displacement,), (tilt,) = exact_jitter(np.zeros(1))
     data.qpos[3:7] = attitude.from_rotation_vector(np.array([tilt.real, tilt.imag, 0.0]))
     data.qpos[0], data.qpos[1] = displacement.real, displacement.imag
-    # A turning vector's rate is i W times itself.
+    # The derivative of a rotating vector is i W times the vector.
     data.qvel[0], data.qvel[1] = -SPEED * displacement.imag, SPEED * displacement.real
     data.qvel[3], data.qvel[4] = -SPEED * tilt.imag, SPEED * tilt.real
     data.qvel[6] = SPEED
@@ -132,7 +132,7 @@ def _model(conditions: Conditions, *, clamped: bool) -> Any:
 
 
 def _amplitudes(values: Array, *columns: Array) -> Array:
-    """Return the factors of the columns that together are nearest to ``values`` (n,)."""
+    """Return the least-squares coefficients of the columns for ``values`` (n,)."""
     return np.asarray(np.linalg.lstsq(np.stack(columns, axis=1), values)[0])
 
 
@@ -141,9 +141,9 @@ BENCHMARKS = (
         name="imbalance",
         title="Static and dynamic imbalance of a wheel",
         shows=(
-            "MuJoCo's force and torque sensors weigh an unbalanced wheel to rounding, and RK4 has "
-            "the jitter of a free bus to eight digits at 105 steps a turn. At one step a turn, "
-            "enough for a balanced wheel, nothing of it is true."
+            "MuJoCo's force and torque sensors measure an unbalanced wheel to rounding, and RK4 "
+            "has the jitter of a free bus to eight digits at 105 steps a turn. One step a turn is "
+            "enough for a balanced wheel, but gives a wrong jitter."
         ),
         source="Newton and Euler for a turning rotor; closed forms, derived here",
         step=1e-4,

@@ -1,4 +1,4 @@
-"""A lander that drops onto the Moon: its legs give, it comes to rest, and it stays where it is."""
+"""A lander dropped onto the Moon: its legs compress, it comes to rest and does not creep."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ TOUCHDOWN = np.sqrt(2.0 * DROP / GRAVITY)  # s
 def exact_height(time: Array) -> Array:
     """Return the hull's height above its stance [m]: a fall, then a damped oscillation.
 
-    The feet stop dead on rigid ground and the hull goes on as a mass on four springs and dampers,
+    The feet stop at once on rigid ground; the hull moves as a mass on four springs and dampers,
     M x'' + 4 c x' + 4 k x = M g with x downwards.
     """
     hull, stiffness = MASS - 4.0 * FOOT, 4.0 * STIFFNESS
@@ -58,7 +58,7 @@ def level(conditions: Conditions) -> Readings:
 
 
 def slope(conditions: Conditions) -> Readings:
-    """Drop, level, onto a slope: one foot touches first, and it rocks until all four do."""
+    """Drop onto a slope: one foot touches first, and the lander rocks until all four do."""
     record, force = _drop(conditions, SLOPE, 7.0, samples=350)
     energy = _energy(record)
     legs = [Curve(f"leg {leg}", record.time, record.qpos[:, 7 + leg]) for leg in range(len(FEET))]
@@ -82,7 +82,7 @@ def _drop(
                 spec.geom(f"leg_{leg}_pad").priority = 0
 
     def read(model: Any, data: Any, time: float) -> None:
-        # What constraints do to the free joint's translation is what the ground does.
+        # The constraint force on the free joint's translation is the ground's.
         force[:] = data.qfrc_constraint[:3]
 
     model = stand.build(conditions, "lander", adapt=adapt)
@@ -125,15 +125,15 @@ BENCHMARKS = (
         name="lander-contact",
         title="Lander dropped onto level ground",
         shows=(
-            "The legs give as springs and dampers do, the ground gives no energy back, and in the "
-            "end it carries the weight. The other integrators arrive half a millimetre early and "
-            "gain 0.08 J in the impact, but come to the same rest."
+            "The legs act as springs and dampers, the ground returns no energy, and finally it "
+            "carries the weight. With the other integrators touchdown is half a millimetre early "
+            "and the impact gains 0.08 J, but the final rest is the same."
         ),
         source="classic closed form, derived here: a fall, then a mass on springs and dampers",
         step=0.002,  # the dampers on the feet alone, 533 /s, bear 5 ms at most with RK4
         bounds=(
             Bound("fall", "m", 1e-12, "a parabola, exact for RK4; 2e-16 measured"),
-            Bound("heave", "m", 5e-4, "the ground gives, the truth's does not; 1.5e-4 measured"),
+            Bound("heave", "m", 5e-4, "soft ground, rigid in the solution; 1.5e-4 measured"),
             Bound("gain", "J", 1e-3, "of 17 J lost, stored in the ground; 4e-5 measured"),
             Bound("sink", "m", 2e-3, "0.57 m/s stopped within 4 ms; 9e-4 measured"),
             Bound("rest force", "of the weight", 1e-6, "exp(-8.2 t) of the heave; 7e-8 measured"),
@@ -150,9 +150,9 @@ BENCHMARKS = (
         name="lander-slope",
         title="Lander dropped onto a slope",
         shows=(
-            "It touches with one foot, rocks, comes to rest and stays, its energy falling all the "
-            "time. MuJoCo's contacts and friction are soft: by default the lander creeps downhill "
-            "by 0.7 mm/s for ever. The other integrators come to the same rest."
+            "It touches with one foot, rocks and comes to rest; its energy never rises. MuJoCo's "
+            "contacts and friction are soft: with the defaults the lander creeps downhill at 0.7 "
+            "mm/s without end. The other integrators come to the same rest."
         ),
         source="energy and equilibrium: at rest the ground's force is the weight, reversed",
         step=0.002,  # as on level ground

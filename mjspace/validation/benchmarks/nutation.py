@@ -1,4 +1,4 @@
-"""An axisymmetric body without torque: two turns at constant rates, nutation that never dies."""
+"""An axisymmetric body without torque: precession at constant rates, undamped nutation."""
 
 from typing import Any
 
@@ -69,9 +69,9 @@ BENCHMARKS = (
         name="nutation",
         title="Nutation of an axisymmetric body",
         shows=(
-            "RK4 leaves nutation alone. At a nutation frequency l and a step h, Euler and "
-            "implicitfast with jointed bodies make it grow at the rate l^2 h / 2, and implicit "
-            "damps it as fast: a damper's effect would be theirs as much as its own."
+            "RK4 keeps the amplitude of nutation. At a nutation frequency l and a step h, Euler "
+            "and, with jointed bodies, implicitfast make it grow at the rate l^2 h / 2, and "
+            "implicit damps it as fast: this would be confused with the effect of a damper."
         ),
         source="Euler's equations; Landau and Lifshitz, Mechanics, section 33",
         step=0.01,

@@ -1,4 +1,4 @@
-"""Free bodies beside the orbit that the frame falls along: Kepler's ellipses, and Hill's motion."""
+"""Free bodies near the orbit of the free-fall frame: Kepler's ellipses, and Hill's motion."""
 
 import numpy as np
 
@@ -74,7 +74,7 @@ def coast(place: Array, velocity: Array, time: Array) -> tuple[Array, Array]:
 
 
 def hill(beside: Array, drifts: Array, time: Array) -> Array:
-    """Return where a body is, up, along and across (n, 3) [m], of ``beside`` and ``drifts`` (3,).
+    """Return positions (n, 3) [m], up, along, across, from ``beside`` [m] and ``drifts`` [m/s].
 
     Clohessy and Wiltshire, Terminal guidance system for satellite rendezvous, 1960.
     """
@@ -93,7 +93,7 @@ def hill(beside: Array, drifts: Array, time: Array) -> Array:
 
 
 def fly_kepler(conditions: Conditions) -> Readings:
-    """Let a body fall along an ellipse, seen from a frame that falls along another."""
+    """Fly a body on one ellipse, in a frame that falls along another."""
     outside = Environment(orbit=FRAME)
     model = stand.build(conditions, "orbiter", outside=outside)
     data = stand.start(model, outside)
@@ -119,7 +119,7 @@ def fly_kepler(conditions: Conditions) -> Readings:
 
 
 def fly_hill(conditions: Conditions) -> Readings:
-    """Let a body drift beside a circular orbit: far and near, this way and the other."""
+    """Let a body drift near a circular orbit: from a far and a near offset, of both signs."""
     outside = Environment(orbit=CIRCLE)
     model = stand.build(conditions, "orbiter", outside=outside)
     frame = state(CIRCLE)
@@ -136,13 +136,13 @@ def fly_hill(conditions: Conditions) -> Readings:
         off.append(np.linalg.norm(record.qpos[:, :3] - exact, axis=1))
         flown.append(_in_orbit_axes(record.time, record.qpos[:, :3]))
     far, back, near, near_back = flown
-    time, wanted = record.time, hill(BESIDE, DRIFTS, record.time)
-    # what is odd in the offset is Hill's, to third order; what is even is of second order
+    time, exact = record.time, hill(BESIDE, DRIFTS, record.time)
+    # the part odd in the offset is Hill's, to third order; the even part is of second order
     linear = 5.0 * (near - near_back)
     return Readings(
         values={
             "position": np.max(off),
-            "Hill's part": np.abs(linear - wanted).max() / 10.0,
+            "Hill's part": np.abs(linear - exact).max() / 10.0,
             "drift": linear[-1, 1],
             "second order": np.abs(far + back).max() / np.abs(near + near_back).max(),
         },
@@ -150,7 +150,7 @@ def fly_hill(conditions: Conditions) -> Readings:
             "along the orbit [m]",
             "up [m]",
             (
-                Curve("Clohessy-Wiltshire", wanted[:, 1], wanted[:, 0]),
+                Curve("Clohessy-Wiltshire", exact[:, 1], exact[:, 0]),
                 Curve("MuJoCo", far[:, 1], far[:, 0], dots=True),
             ),
         ),
@@ -167,10 +167,10 @@ def _in_orbit_axes(time: Array, place: Array) -> Array:
 BENCHMARKS = (
     Benchmark(
         name="kepler",
-        title="A body on one ellipse, seen from another",
+        title="A body on one ellipse, in the frame of another",
         shows=(
-            "In the free-fall frame a body thousands of kilometres away keeps to Kepler's ellipse "
-            "to a hair's breadth over two orbits, for its gravity is evaluated in every stage."
+            "In the free-fall frame a body thousands of kilometres away stays on Kepler's ellipse "
+            "to 15 micrometres over two orbits, since its gravity is evaluated in every stage."
         ),
         source="Kepler's equation; Battin, Mathematics and Methods of Astrodynamics, 1999, ch. 4",
         step=1.0,
@@ -193,8 +193,8 @@ BENCHMARKS = (
         name="hill",
         title="Drift beside a circular orbit (Clohessy-Wiltshire)",
         shows=(
-            "Two neighbours in orbit drift apart by 2 km a turn as Hill's equations say, and by "
-            "the 0.3 m more that their two ellipses say."
+            "Two neighbouring bodies in orbit drift apart by 2 km a revolution as Hill's equations "
+            "predict, plus the 0.3 m of their exact ellipses."
         ),
         source=(
             "Clohessy and Wiltshire, Terminal guidance system for satellite rendezvous, 1960; the "
@@ -213,7 +213,7 @@ BENCHMARKS = (
                 "Hill's part",
                 "m",
                 3e-7,
-                "what is odd in an offset of 10 m, that of the third order included: 3e-8 measured",
+                "the part odd in an offset of 10 m, third order included: 3e-8 measured",
             ),
             Bound(
                 "drift",
@@ -226,7 +226,7 @@ BENCHMARKS = (
                 "second order",
                 "times",
                 1e-5,
-                "what is even shrinks 100 times with a tenth of the offset; 6e-7 measured",
+                "the even part shrinks 100 times with a tenth of the offset; 6e-7 measured",
                 100.0,
             ),
         ),

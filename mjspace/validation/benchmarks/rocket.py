@@ -29,7 +29,7 @@ PITCH = 0.1  # rad/s at ignition
 
 
 def mass(time: Array) -> Array:
-    """Return the mass that is left [kg]."""
+    """Return the remaining mass [kg]."""
     return MASS - FLOW * time
 
 
@@ -55,7 +55,7 @@ def burn(conditions: Conditions) -> Readings:
     """Burn straight ahead from rest."""
 
     def thrust(model: Any, data: Any, time: float) -> Array:
-        # MuJoCo has the mass of the step's start; the ratio makes it that of the stage.
+        # The model has the mass of the step's start; the ratio corrects it to that of the stage.
         force[0] = THRUST * model.body_mass[1] / (MASS - FLOW * time)
         return force
 
@@ -74,7 +74,7 @@ def burn(conditions: Conditions) -> Readings:
 
 
 def pitch(conditions: Conditions) -> Readings:
-    """Burn while pitching: the jet takes the rate away."""
+    """Burn while pitching: the jet damps the rate."""
     sign = -1.0 if conditions.fault == "sign" else 1.0
     gain = sign * FLOW * (LEVER**2 - GYRATION**2)
 
@@ -134,7 +134,7 @@ BENCHMARKS = (
         ),
         fly=burn,
         catches={
-            "erratum": "the body left simple, so that it never feels the edits of its mass",
+            "erratum": "the body left simple, so that edits of its mass have no effect",
             "integrator": "",
             "held": "",
         },
@@ -144,9 +144,9 @@ BENCHMARKS = (
         name="jet-damping",
         title="Jet damping of a pitching rocket",
         shows=(
-            "MuJoCo keeps a body's rate when its inertia is edited, as if what leaves took its own "
-            "share of the momentum along. That the jet takes more has to be added as a torque; "
-            "with it the rate falls to 64 % as it should."
+            "MuJoCo keeps a body's rate when its inertia is edited, as if the expelled mass took "
+            "its own share of the momentum along. The additional momentum of the jet has to be "
+            "added as a torque; with it the rate falls to 64 %, as it should."
         ),
         source="classic closed form, derived here: d(m kg^2 w)/dt = m' re^2 w",
         step=1.0,  # the one time scale is the burn's
@@ -157,7 +157,7 @@ BENCHMARKS = (
         fly=pitch,
         catches={
             "sign": "the jet's torque drives the rate",
-            "erratum": "the body left simple, so that it never feels the edits of its inertia",
+            "erratum": "the body left simple, so that edits of its inertia have no effect",
             "armature": "",
             "integrator": "",
             "held": "",

@@ -1,4 +1,4 @@
-"""A body without torque: its tumble in elliptic functions, its flip about the middle axis."""
+"""A body without torque: tumble in elliptic functions, and flip about the middle axis."""
 
 from typing import Any
 
@@ -90,7 +90,7 @@ def tumble(conditions: Conditions) -> Readings:
 
 
 def flip(conditions: Conditions) -> Readings:
-    """Fly the spinner about its middle axis: it turns over again and again."""
+    """Fly the spinner about its middle axis, about which it flips periodically."""
 
     def slim(spec: Any) -> None:
         spec.body("bus").inertia = SPINNER
@@ -134,8 +134,8 @@ BENCHMARKS = (
         name="torque-free",
         title="Torque-free tumble of an asymmetric body",
         shows=(
-            "MuJoCo's RK4 keeps attitude, momentum and energy of a tumbling satellite for a minute "
-            "at a step of 10 ms as well as doubles can; its other integrators lose degrees."
+            "MuJoCo's RK4 has attitude, momentum and energy of a tumbling satellite for a minute "
+            "at a step of 10 ms nearly to rounding; its other integrators are off by degrees."
         ),
         source="Jacobi's elliptic functions; Landau and Lifshitz, Mechanics, section 37",
         step=0.01,
@@ -162,8 +162,8 @@ BENCHMARKS = (
         name="middle-axis",
         title="Flip about the middle axis (Dzhanibekov)",
         shows=(
-            "The flip interval alone proves nothing: Euler meets it to 2e-6 with 10 % of the "
-            "energy gone wrong. Energy and momentum are the test."
+            "The flip interval alone is no test: Euler has it to 2e-6 with an energy error of 10 "
+            "%. Energy and momentum are the test."
         ),
         source="Landau and Lifshitz, Mechanics, section 37: half a period is 2 K(m) / p",
         step=0.01,

@@ -61,7 +61,7 @@ def exact_gyrostat(time: Array) -> tuple[Array, Array]:
 
 
 def spin_up(conditions: Conditions) -> Readings:
-    """Let the motor turn the wheel, and the wheel the bus."""
+    """Spin up the wheel by its motor, whose reaction turns the bus."""
     model = stand.build(conditions, "bus_wheel")
     data = stand.start(model)
     data.ctrl[0] = -TORQUE if conditions.fault == "sign" else TORQUE
@@ -90,7 +90,7 @@ def spin_up(conditions: Conditions) -> Readings:
 
 
 def stiffen(conditions: Conditions) -> Readings:
-    """Fly a tumbling bus that a fast wheel keeps from turning freely."""
+    """Fly a tumbling bus that is gyroscopically stiffened by a fast wheel."""
     model = stand.build(conditions, "bus_wheel")
     data = stand.start(model)
     data.qvel[3:6], data.qvel[6] = RATE, SPEED
@@ -120,9 +120,9 @@ BENCHMARKS = (
         name="wheel-spin-up",
         title="Momentum exchange of a bus and its wheel",
         shows=(
-            "A motor between two bodies hands over momentum to the last digit. Put the rotor's "
-            "inertia into armature and the total that one sees is conserved just the same, but "
-            "the bus hardly turns: rates, not the total, are the test."
+            "A motor between two bodies transfers momentum to rounding. With the rotor's inertia "
+            "as armature the total momentum is conserved as well, but the bus hardly turns: the "
+            "rates, not the total, are the test."
         ),
         source="Momentum and angular impulse; closed form, derived here",
         step=0.01,
@@ -137,7 +137,7 @@ BENCHMARKS = (
         ),
         fly=spin_up,
         catches={
-            "sign": "the motor given the torque that the bus should feel, not its reaction",
+            "sign": "the motor has the torque on the bus instead of its reaction",
             "armature": "",
             "integrator": "",
             "inertia": "",
@@ -147,9 +147,10 @@ BENCHMARKS = (
         name="fast-wheel",
         title="A bus made stiff by a fast wheel",
         shows=(
-            "A wheel at 600 rad/s needs no small step: it turns 6 rad in each, and what counts is "
-            "the bus's nutation. Momentum and energy are divided by the bus's own; divided by the "
-            "wheel's, Euler's bus rate is 6 % wrong after a minute beside an energy error of 1e-6."
+            "A wheel at 600 rad/s needs no small step: it turns 6 rad in each, but the step is set "
+            "by the bus's nutation. Momentum and energy errors are relative to the bus's own; "
+            "relative to the wheel's, Euler has an energy error of 1e-6 with a bus rate that is 6 "
+            "% wrong after a minute."
         ),
         source=(
             "Gyrostat equations (Hughes, Spacecraft Attitude Dynamics, 1986, chapter 6), "

@@ -1,4 +1,4 @@
-"""Despin by yo-yo: two weights on cords that unwind, let go tangentially or swung out radially."""
+"""Yo-yo despin: two weights on unwinding cords, released tangentially or radially."""
 
 from typing import Any
 
@@ -56,11 +56,11 @@ HALF_SPIN = swinging(0.5 * RADIAL, np.array(np.pi / 2.0))[0]  # rad/s
 
 
 def let_go(conditions: Conditions) -> Readings:
-    """Unwind, let go as the last of the cord comes off, and look what spin is left."""
+    """Unwind the cords, release them at their end, and measure the remaining spin."""
     tension = [0.0]
 
     def read(model: Any, data: Any, time: float) -> None:
-        # What keeps the weights from sliding out is the cord.
+        # The cord's tension keeps the weights from sliding outwards.
         tension.append(-data.qfrc_constraint[7] - data.qfrc_constraint[9])
 
     model, data, begin = _wound(conditions, TANGENTIAL)
@@ -86,7 +86,7 @@ def let_go(conditions: Conditions) -> Readings:
 
 
 def swing_out(conditions: Conditions) -> Readings:
-    """Unwind a cord and swing it out until it points outwards; then one of half the length."""
+    """Unwind a cord and swing it until it points outwards; then the same at half the length."""
     record, begin = _swing(conditions, RADIAL)
     time = begin / SPIN + record.time
     angles = np.linspace(0.0, 2.0, 200)
@@ -164,8 +164,8 @@ BENCHMARKS = (
         title="Yo-yo despin, let go tangentially",
         shows=(
             "Constraints can be trusted to 1e-7 if they are linear in the joints, as stiff as the "
-            "step allows, and met at a reference pose with a regular mass matrix. With MuJoCo's "
-            "default softness 0.6 % of the spin is left, with a singular pose all of it."
+            "step allows, and satisfied at a reference pose with a regular mass matrix. With "
+            "MuJoCo's default softness 0.6 % of the spin remains, with a singular pose all of it."
         ),
         source=(
             "Fedor, Theory and Design Curves for a Yo-Yo De-Spin Mechanism for Satellites, NASA "
@@ -193,9 +193,9 @@ BENCHMARKS = (
         name="yo-yo-radial",
         title="Yo-yo despin, swung out",
         shows=(
-            "A cord that swings is a constraint that bends: MuJoCo leaves the bend's acceleration "
-            "out of tendons and lets them stretch by 4 h^2 of it, here by 0.1 mm. That is second "
-            "order in the step, and the price of a taut tendon."
+            "A swinging cord is a curved constraint: MuJoCo neglects its centripetal acceleration "
+            "in tendons and lets them stretch by 4 h^2 of it, here by 0.1 mm. That is second order "
+            "in the step, and the error of a taut tendon."
         ),
         source="classic closed form, derived here from the two integrals, and one quadrature",
         step=0.001,  # 0.74 s until the cord points outwards, and that is the end
