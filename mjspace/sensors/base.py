@@ -54,7 +54,8 @@ class Sensor(Table, Generic[Deviation]):
     """A sensor: its table in the scenario, what it measures, and how it errs. Ideal by default.
 
     A kind of sensor is a subclass with the type of its errors, ``Sensor[Annotated[NonNegative,
-    Si("rad/s")]]``, the quantity as default of ``measures``, and ``true_value``.
+    Si("rad/s")]]``, the quantity as default of ``measures``, its ``unit``, and ``true_value`` where
+    the quantity is no field of ``Motion``.
     """
 
     measures: str
@@ -105,8 +106,9 @@ class Sensor(Table, Generic[Deviation]):
         """Raise a ValueError where there is nothing that the sensor could measure."""
 
     def true_value(self, motion: Motion) -> Array:
-        """Return the quantity's true value, (..., width)."""
-        raise NotImplementedError
+        """Return the quantity's true value, (..., width): by default, the motion's of its name."""
+        value: Array = getattr(motion, self.measures)
+        return value
 
     def begin(self, memory: State, name: str, truth: Measurement) -> Array:
         """Put the start into ``memory``, under names that begin with ``name``; return sample 0."""

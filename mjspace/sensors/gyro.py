@@ -2,9 +2,8 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from mjspace.contract import Array
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Motion, Sensor
+from mjspace.sensors.base import Sensor
 
 
 class Gyro(Sensor[Annotated[NonNegative, Si("rad/s")]]):
@@ -12,7 +11,3 @@ class Gyro(Sensor[Annotated[NonNegative, Si("rad/s")]]):
 
     measures: Literal["rate"] = "rate"
     unit: ClassVar[str] = "rad/s"
-
-    def true_value(self, motion: Motion) -> Array:
-        """Return the angular velocity [rad/s], body axes, (..., 3)."""
-        return motion.rate

@@ -2,9 +2,8 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from mjspace.contract import Array
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Motion, Sensor
+from mjspace.sensors.base import Sensor
 
 
 class PositionFix(Sensor[Annotated[NonNegative, Si("m")]]):
@@ -13,7 +12,3 @@ class PositionFix(Sensor[Annotated[NonNegative, Si("m")]]):
     measures: Literal["position"] = "position"
     unit: ClassVar[str] = "m"
     of_translation: ClassVar[bool] = True
-
-    def true_value(self, motion: Motion) -> Array:
-        """Return the position [m], inertial axes, (..., 3)."""
-        return motion.position

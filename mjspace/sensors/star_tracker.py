@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mjspace.contract import Array
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Motion, Sensor
+from mjspace.sensors.base import Sensor
 
 
 class StarTracker(Sensor[Annotated[NonNegative, Si("rad")]]):
@@ -22,10 +22,6 @@ class StarTracker(Sensor[Annotated[NonNegative, Si("rad")]]):
     unit: ClassVar[str] = ""
     width: ClassVar[int | None] = 4
     axes: ClassVar[int | None] = 3
-
-    def true_value(self, motion: Motion) -> Array:
-        """Return the quaternion, scalar first, body to inertial, (..., 4)."""
-        return motion.attitude
 
     def with_error(self, value: Array, error: Array) -> Array:
         """Return the attitude turned by the rotation vector ``error`` [rad], then rounded.

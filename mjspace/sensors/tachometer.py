@@ -2,9 +2,8 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from mjspace.contract import Array
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Motion, Sensor
+from mjspace.sensors.base import Sensor
 
 
 class Tachometer(Sensor[Annotated[NonNegative, Si("rad/s")]]):
@@ -13,7 +12,3 @@ class Tachometer(Sensor[Annotated[NonNegative, Si("rad/s")]]):
     measures: Literal["wheel_speed"] = "wheel_speed"
     unit: ClassVar[str] = "rad/s"
     width: ClassVar[int | None] = None
-
-    def true_value(self, motion: Motion) -> Array:
-        """Return the wheel speeds [rad/s], (..., n)."""
-        return motion.wheel_speed

@@ -2,9 +2,8 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from mjspace.contract import Array
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Motion, Sensor
+from mjspace.sensors.base import Sensor
 
 
 class VelocityFix(Sensor[Annotated[NonNegative, Si("m/s")]]):
@@ -13,7 +12,3 @@ class VelocityFix(Sensor[Annotated[NonNegative, Si("m/s")]]):
     measures: Literal["velocity"] = "velocity"
     unit: ClassVar[str] = "m/s"
     of_translation: ClassVar[bool] = True
-
-    def true_value(self, motion: Motion) -> Array:
-        """Return the velocity [m/s], inertial axes, (..., 3)."""
-        return motion.velocity

@@ -7,10 +7,15 @@ import numpy as np
 
 from mjspace.contract import REPORTED_BY_PLANT, Array, Measurement, Truth
 from mjspace.environment import kepler
+from mjspace.scenario.sensors import ALWAYS, kind_of
 from mjspace.sensors.base import Motion
 from mjspace.sensors.magnetometer import Magnetometer
 from mjspace.sensors.velocimeter import Velocimeter
 from mjspace.simulation.assembly import Assembly
+
+_TRANSLATION = ("position", "velocity", "altitude")
+"""Quantities that the truth has wherever a sensor measures the bus's translation."""
+_VELOCIMETER, _MAGNETOMETER = Velocimeter(), Magnetometer()
 
 
 class StateLayout:
@@ -34,13 +39,13 @@ class StateLayout:
         self.struts = _columns(before_qpos + vehicle.strut_qpos)
         self.feet = len(vehicle.strut_qpos)
         kinds = {sensor.measures: sensor for sensor in assembly.scenario.sensors.values()}
-        self.translates = any(sensor.of_translation for sensor in kinds.values())
+        if any(sensor.of_translation for sensor in kinds.values()):
+            kinds = {name: kind_of(name)() for name in _TRANSLATION} | kinds
         self.surroundings = assembly.surroundings
-        known = ("attitude", "rate", "wheel_speed", "position", "velocity", "altitude")
         self.measured = {
             quantity: sensor
             for quantity, sensor in kinds.items()
-            if quantity not in known and not sensor.integrates
+            if quantity not in ALWAYS and not sensor.integrates
         }
         orbit = assembly.scenario.environment.orbit
         self.orbit = None if orbit is None else kepler.pack(orbit)
@@ -55,9 +60,6 @@ class StateLayout:
             none = np.zeros((*physics.shape[:-1], self.feet))
             one = none[..., :1]
             truth = truth._replace(contact=one, foot_contact=none, hull_contact=one)
-        if self.translates:
-            position, velocity = physics[..., self.position], physics[..., self.velocity]
-            truth = truth._replace(position=position, velocity=velocity, altitude=position[..., 2:])
         if self.measured:
             motion = self.moving_bus(physics)
             measured = {name: sensor.true_value(motion) for name, sensor in self.measured.items()}
@@ -71,8 +73,8 @@ class StateLayout:
             "position": motion.position,
             "velocity": motion.velocity,
             "altitude": motion.position[..., 2:],
-            "ground_velocity": Velocimeter().true_value(motion),
-            "magnetic_field": Magnetometer().true_value(motion),
+            "ground_velocity": _VELOCIMETER.true_value(motion),
+            "magnetic_field": _MAGNETOMETER.true_value(motion),
         }
         vehicles, time = len(physics), float(physics[0, 0])
         place = np.empty(0) if self.orbit is None else kepler.position(self.orbit, time)
