@@ -6,12 +6,13 @@ import inspect
 import math
 from collections.abc import Iterator
 from functools import cache
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
 
 from mjspace.scenario.construct import controllers
+from mjspace.scenario.fields import tables_in
 from mjspace.scenario.loading import load, scenario_names
 from mjspace.scenario.scenario import Component, Scenario
 
@@ -117,14 +118,11 @@ def tables() -> dict[type[BaseModel], list[dict[str, Any]]]:
 
 
 def _kinds_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if inspect.isclass(annotation) and issubclass(annotation, BaseModel):
-        if annotation is not Component:
-            yield annotation
-            for field in annotation.model_fields.values():
-                yield from _kinds_in(field.annotation)
-        return
-    for part in get_args(annotation):
-        yield from _kinds_in(part)
+    for table in tables_in(annotation):
+        if table is not Component:
+            yield table
+            for field in table.model_fields.values():
+                yield from _kinds_in(field.rebuild_annotation())
 
 
 def _models_in(value: Any) -> Iterator[BaseModel]:

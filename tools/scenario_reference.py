@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mjspace.scenario.construct import controllers
-from mjspace.scenario.fields import Si
+from mjspace.scenario.fields import Si, tables_in
 from mjspace.scenario.scenario import Scenario
 
 PAGE = Path(__file__).parents[1] / "docs/scenario.md"
@@ -47,7 +47,7 @@ def page() -> str:
         lines += [f"## {f'`{path}`' if path else 'At the top'}", "", _line(table.__doc__ or ""), ""]
         lines += ["| key | value | default | what |", "|---|---|---|---|"]
         for key, field in table.model_fields.items():
-            inner = _table_in(field.annotation)
+            inner = _table_in(field)
             what = _line(field.description or (inner.__doc__ if inner else "") or "")
             lines.append(f"| `{key}` | {_value(field)} | {_default(field)} | {what} |")
         lines.append("")
@@ -92,7 +92,7 @@ def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseM
     """Yield each table of a scenario with its TOML heading, in the order of the keys."""
     yield path, table
     for key, field in table.model_fields.items():
-        inner = _table_in(field.annotation)
+        inner = _table_in(field)
         if inner is not None:
             name = f"{path.strip('[]')}.{key}".lstrip(".")
             many = get_origin(field.annotation)
@@ -100,16 +100,14 @@ def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseM
             yield from _tables(inner, heading)
 
 
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((t for part in get_args(annotation) if (t := _table_in(part))), None)
+def _table_in(field: FieldInfo) -> type[BaseModel] | None:
+    return next(tables_in(field.rebuild_annotation()), None)
 
 
 def _value(field: FieldInfo) -> str:
     """Return what a key holds, as a person says it."""
     annotation = field.annotation
-    if _table_in(annotation):
+    if _table_in(field):
         many = {list: "tables", dict: "tables by name"}
         return many.get(get_origin(annotation), "table")
     return _kind(Annotated[annotation, *field.metadata] if field.metadata else annotation)

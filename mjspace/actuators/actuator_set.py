@@ -9,7 +9,7 @@ import numpy as np
 from mjspace.actuators.base import Actuators, State
 from mjspace.actuators.thrusters import Thrusters
 from mjspace.contract import Array, Measurement
-from mjspace.environment.kernel import MOMENT
+from mjspace.environment.magnetic_field import MOMENT
 from mjspace.errors import FlightError
 from mjspace.vehicle.indices import is_thruster
 

@@ -19,7 +19,7 @@ from mjspace import attitude
 from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.contract import Array, DesiredMotion, Measurement
 from mjspace.dm_env import bridge
-from mjspace.environment import install
+from mjspace.environment.install import install_callbacks
 from mjspace.errors import InputError
 from mjspace.scenario import loading
 from mjspace.simulation.assembly import Assembly, assemble
@@ -74,7 +74,7 @@ class Physics(bridge.Physics):  # type: ignore[misc]
 
     def reset(self, keyframe_id: int | None = None) -> None:
         """Return to the scenario's start; the vehicle has no keyframes."""
-        install.install()
+        install_callbacks()
         super().reset(keyframe_id)
         self.set_state(self._start, INTEGRATION)
 

@@ -1,8 +1,10 @@
 """The kinds of value that a scenario's keys hold: SI numbers, vectors and frozen tables."""
 
+import importlib
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import numpy as np
 from pydantic import (
@@ -59,6 +61,41 @@ class Si:
         return {**handler(schema), "unit": self.unit}
 
 
+@dataclass(frozen=True)
+class DeclaredIn:
+    """Marks a key whose table is a class in the file of the part that it describes.
+
+    ``Annotated[Any, DeclaredIn("mjspace.environment.orbit:Orbit")]``: the class is imported when
+    pydantic first builds the schema, so that this room imports none of those above it.
+    """
+
+    place: str
+    """``"module:Class"``."""
+
+    def load(self) -> type[BaseModel]:
+        """Return the class."""
+        module, _, name = self.place.partition(":")
+        found: type[BaseModel] = getattr(importlib.import_module(module), name)
+        return found
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Validate by the class."""
+        return handler.generate_schema(self.load())
+
+
+def tables_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the tables that a field's annotation names, those marked ``DeclaredIn`` too."""
+    if isinstance(annotation, DeclaredIn):
+        yield annotation.load()
+    elif isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    else:
+        for part in get_args(annotation):
+            yield from tables_in(part)
+
+
 def of_form(form: Form) -> AfterValidator:
     """Return what refuses an array that is not of that form."""
 
@@ -108,4 +145,6 @@ Matrix3 = Annotated[
 class Table(BaseModel):
     """A TOML table: frozen, and with no key that is not listed."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, use_attribute_docstrings=True, defer_build=True
+    )

@@ -1,12 +1,13 @@
 """The tables of a scenario: rates, plant and initial state."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
 from mjspace.scenario.deployments import Deployment
 from mjspace.scenario.fields import (
     Angles3,
+    DeclaredIn,
     Finite,
     Matrix3,
     Meters3,
@@ -22,7 +23,6 @@ from mjspace.scenario.fields import (
     Table,
     Unit3,
     Velocity3,
-    WithinTurn,
 )
 from mjspace.scenario.hinges import Bearing, Hinge
 from mjspace.scenario.landing import Engine, Ground
@@ -79,17 +79,6 @@ class Wheels(Bearing):
         return self
 
 
-class Ripple(Table):
-    """A motor's torque ripple: amplitude cos(cycles angle + phase) on its hinge, with reaction."""
-
-    amplitude: Annotated[NonNegative, Si("N m")]
-    """Largest torque."""
-    cycles: NonNegative
-    """In a turn of the hinge; a fraction makes a ripple slower than the turn."""
-    phase: WithinTurn = 0.0
-    """At angle zero."""
-
-
 class Part(Table):
     """Something bolted to the bus that moves of itself: a nutation damper, a boom, a yo-yo."""
 
@@ -144,7 +133,7 @@ class PlantTable(Table):
     servos: Servos | None = None
     """Speed loops on every hinge of the parts that a motor turns, in place of ``drives``; none when
     left out."""
-    ripple: dict[Name, Ripple] = {}
+    ripple: dict[Name, Annotated[Any, DeclaredIn("mjspace.environment.torque_ripple:Ripple")]] = {}
     """Torque ripple of motors, by the hinge."""
     ideal_thrusters: Switch = False
     """Whether a torque that the law asks for acts on the bus as if by thrusters, as it is: its

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
+    Field,
     ValidationInfo,
     field_validator,
     model_validator,
@@ -156,9 +157,9 @@ class Scenario(Table):
     duration: Seconds
     """Simulated time."""
     rates: Rates = Rates()
-    plant: PlantTable = PlantTable()
+    plant: PlantTable = Field(default_factory=PlantTable)
     initial: Initial = Initial()
-    environment: Environment = Environment()
+    environment: Environment = Field(default_factory=Environment)
     sensors: Sensors = Sensors()
     reference: Component
     law: Component

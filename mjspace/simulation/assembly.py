@@ -19,11 +19,10 @@ from mjspace.actuators.motor_drives import MotorDrives
 from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.actuators.thrusters import Thrusters
 from mjspace.contract import Array, Law, ReferenceSource
-from mjspace.environment import central_gravity, install
 from mjspace.environment.geomagnetism import FieldAlongOrbit, along
+from mjspace.environment.install import userdata, userdata_size
 from mjspace.errors import input_error_at
 from mjspace.scenario.construct import construct, load_object
-from mjspace.scenario.hinges import Friction
 from mjspace.scenario.landing import Engine
 from mjspace.scenario.plant import PlantTable
 from mjspace.scenario.scenario import Component, Scenario
@@ -109,7 +108,8 @@ class Assembly:
         table = self.scenario.environment.gravity
         if table is None:
             return np.zeros_like(position)
-        return central_gravity.acceleration(central_gravity.pack(table), position)
+        acceleration: Array = table.acceleration(position)
+        return acceleration
 
 
 def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None) -> Assembly:
@@ -120,9 +120,7 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
     Raises:
         InputError: a part cannot be built, with the scenario's key and what would be right.
     """
-    friction = _friction(scenario.plant)
-    ripple = scenario.plant.ripple
-    size = install.userdata_size(scenario.environment, friction, ripple)
+    size = userdata_size(scenario.environment, scenario.plant)
     vehicle = _part("plant", partial(build, userdata=size), scenario.plant, scenario.rates)
     facts = {
         "inertia": vehicle.inertia,
@@ -159,11 +157,10 @@ def assemble(scenario: Scenario, folder: Path, *, law_folder: Path | None = None
         qvel=qvel,
         userdata=_part(
             "environment",
-            install.userdata,
+            userdata,
             vehicle.model,
             scenario.environment,
-            friction,
-            ripple,
+            scenario.plant,
         ),
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
         actuators=_part("plant", _actuators, vehicle, scenario, hasattr(law, "inner")),
@@ -245,8 +242,7 @@ def _engine(vehicle: Vehicle, table: Engine, scenario: Scenario) -> GimballedEng
     gravity = 0.0
     if (around := scenario.environment.gravity) is not None:
         place = np.array(scenario.initial.position, dtype=float)
-        pull = central_gravity.acceleration(central_gravity.pack(around), place)
-        gravity = float(np.linalg.norm(pull))
+        gravity = float(np.linalg.norm(around.acceleration(place)))
     return GimballedEngine.of(vehicle, table, gravity=gravity, thrust=scenario.initial.thrust)
 
 
@@ -272,13 +268,6 @@ def _of_gimbals(table: PlantTable, vehicle: Vehicle) -> dict[str, Any]:
         "spin_axes": indices.axes(vehicle.model, vehicle.wheel_dof),
         "wheel_inertia": indices.axial_inertia(vehicle.model, vehicle.wheel_dof),
     }
-
-
-def _friction(table: PlantTable) -> dict[str, Friction]:
-    """Return the dry friction of the hinges that have some, by name."""
-    wheels = {f"wheel_{i}": table.wheels.friction for i in range(len(table.wheels.axes))}
-    every = wheels | {name: hinge.friction for name, hinge in table.hinges.items()}
-    return {name: friction for name, friction in every.items() if friction is not None}
 
 
 def _part(key: str, build: Callable[..., Any], *arguments: Any, **named: Any) -> Any:

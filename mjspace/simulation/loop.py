@@ -11,8 +11,8 @@ from mujoco.batch import Batch, SimulationError
 
 from mjspace.actuators.actuator_set import set_masses
 from mjspace.contract import Array, DesiredMotion, Measurement
-from mjspace.environment import install
-from mjspace.environment.kernel import FIELD
+from mjspace.environment.install import install_callbacks
+from mjspace.environment.magnetic_field import FIELD
 from mjspace.errors import FlightError
 from mjspace.simulation import mujoco_warnings
 from mjspace.simulation.assembly import Assembly
@@ -89,7 +89,7 @@ class _Flight:
     ) -> None:
         scenario = assembly.scenario
         mujoco_warnings.silence()
-        install.install()
+        install_callbacks()
         self.assembly, self.columns = assembly, StateLayout(assembly)
         self.suite = assembly.sensors(members)
         self.sensors, self.law_state = start.sensors, start.law

@@ -40,7 +40,7 @@ class StateLayout:
         self.has_magnetometer = sensors.magnetic_field is not None
         self.field = assembly.field
         orbit = assembly.scenario.environment.orbit
-        self.orbit = None if orbit is None else kepler.pack(orbit)
+        self.orbit = None if orbit is None else orbit.elements()
 
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors see, as views of the state rows where that is possible.
