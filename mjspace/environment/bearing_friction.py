@@ -12,7 +12,7 @@ from mjspace.contract import Array
 from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies
 from mjspace.environment.compiled import compiled
-from mjspace.environment.hinges import hinge
+from mjspace.environment.joints import hinge
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.hinges import Friction
 from mjspace.scenario.plant import PlantTable

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.environment import kernel, struct_offsets
+from mjspace.environment import joints, kernel, struct_offsets
 from mjspace.environment.base import HEADER, MAGIC, Term
 from mjspace.environment.terms import terms_of
 from mjspace.scenario.environment import Environment
@@ -57,9 +57,7 @@ def userdata(model: Any, environment: Environment, plant: PlantTable | None = No
         ValueError: the model has no free joint, lacks a hinge, has no passive forces, too little
             userdata or another kind of sensor under our sensor's name.
     """
-    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    if free.size == 0:
-        raise ValueError("the model has no free joint: the environment needs a bus to act on")
+    dof, _ = joints.bus(model)
     if (model.opt.disableflags & _NO_PASSIVE) == _NO_PASSIVE:
         raise ValueError(
             "the model disables springs and dampers both, and so, in MuJoCo, every passive force, "
@@ -68,7 +66,7 @@ def userdata(model: Any, environment: Environment, plant: PlantTable | None = No
     needed = userdata_size(environment, plant)
     if model.nuserdata < needed:
         raise ValueError(f"the model's nuserdata is {model.nuserdata}: {needed} are needed")
-    header = np.array([MAGIC, model.nv, model.jnt_dofadr[free[0]], _sensor_address(model)])
+    header = np.array([MAGIC, model.nv, dof, _sensor_address(model)])
     blocks = [_block(term, model, environment) for term in terms_of(environment, plant)]
     packed = np.concatenate([header, *blocks])
     return np.pad(packed, (0, model.nuserdata - packed.size))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import cfunc, njit, types
+from numba import cfunc, types
 from numba.np.numpy_support import carray
 
 from mjspace.environment.base import HEADER, MAGIC
@@ -29,18 +29,18 @@ def version_of_terms() -> int:
     return int.from_bytes(digest[:7]) | 1
 
 
-def chain(kernels: Sequence[tuple[int, compiled]]) -> Any:
+def chain(kernels: Sequence[tuple[int, compiled]]) -> compiled:
     """Return a compiled function of (kind, payload, time, bodies) that calls the kind's kernel.
 
     Each link compares one kind and calls the next link: numba inlines them to one chain of
     branches. Other kinds are passed over.
     """
     if not kernels:
-        return njit(lambda kind, payload, time, bodies: None)
+        return compiled(lambda kind, payload, time, bodies: None)
     (number, kernel), *others = kernels
     rest = chain(others)
 
-    @njit(error_model="numpy")
+    @compiled
     def link(kind: float, payload: Any, time: float, bodies: Bodies) -> None:
         if kind == number:
             kernel(payload, time, bodies)
