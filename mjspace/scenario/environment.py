@@ -23,6 +23,7 @@ class Environment(Table):
         Annotated[Any, DeclaredIn("mjspace.environment.disturbance_torque:DisturbanceTorque")]
     ] = []
     """Evaluated at every stage of the integrator."""
+    facet_drag: Annotated[Any, DeclaredIn("mjspace.environment.facet_drag:FacetDrag")] | None = None
     python: str | None = None
     """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
     inertial axes, torque [N m] in body axes), held over each integration step: first order only."""
