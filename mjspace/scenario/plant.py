@@ -4,7 +4,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
-from mjspace.scenario.deployments import Deployment
 from mjspace.scenario.fields import (
     Angles3,
     DeclaredIn,
@@ -88,7 +87,7 @@ class Part(Table):
     """Of its origin in the bus."""
     euler: Angles3 = [0.0, 0.0, 0.0]
     """Roll, pitch, yaw of its axes in the bus's."""
-    deployment: Deployment | None = None
+    deployment: Annotated[Any, DeclaredIn("mjspace.vehicle.deployments:Deployment")] | None = None
     """Of a boom or a yo-yo; it moves as it likes when left out."""
 
     @model_validator(mode="after")

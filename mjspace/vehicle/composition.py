@@ -10,12 +10,12 @@ import numpy as np
 
 from mjspace.contract import Array
 from mjspace.errors import nearest
-from mjspace.scenario.deployments import Deployment
 from mjspace.scenario.hinges import Hinge
 from mjspace.scenario.landing import Ground
 from mjspace.scenario.plant import Part, PlantTable
 from mjspace.scenario.thrusters import Rcs
 from mjspace.vehicle import ground_contact, mass_properties
+from mjspace.vehicle.deployments import Deployment
 
 _ASSETS = Path(str(files("mjspace.assets")))
 _STOP_SPRING = [0.005, 1.0]  # s, damping ratio: of what turns there, whatever its inertia
