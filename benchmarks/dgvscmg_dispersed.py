@@ -17,8 +17,9 @@ from mjspace.controllers.references.rate_references import Sinusoids
 
 from mjspace.contract import Array, Measurement, Reference
 from mjspace.environment.install import userdata
+from mjspace.environment.torque_ripple import Ripple
 from mjspace.scenario.loading import load
-from mjspace.scenario.plant import Ripple
+from mjspace.scenario.plant import PlantTable
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start, last_period
 from mjspace.simulation.loop import fly
@@ -148,7 +149,7 @@ def dispersed(draw: Draw, vehicle: Assembly) -> tuple[Assembly, Start]:
     start.physics[:, StateLayout(vehicle).wheel_speed] = draw.wheel_speed[:, None]
     for row, (amplitude, cycles, phase) in zip(start.physics, draw.vibration, strict=True):
         ripple = {"cmg_wheel": Ripple(amplitude=amplitude, cycles=cycles, phase=phase)}
-        own = userdata(vehicle.vehicle.model, scenario.environment, {}, ripple)
+        own = userdata(vehicle.vehicle.model, scenario.environment, PlantTable(ripple=ripple))
         row[-own.size :] = own  # the last part of MuJoCo's state
     return vehicle, start
 

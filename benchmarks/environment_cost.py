@@ -12,8 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjspace.environment import install
-from mjspace.scenario.environment import DisturbanceTorque, Environment, Orbit, Sine
+from mjspace.environment.disturbance_torque import DisturbanceTorque, Sine
+from mjspace.environment.install import install_callbacks, userdata, userdata_size
+from mjspace.environment.orbit import Orbit
+from mjspace.scenario.environment import Environment
 from mjspace.scenario.plant import PlantTable, Rates
 from mjspace.vehicle import vehicle
 
@@ -37,7 +39,7 @@ def vehicle_state(model: Any, outside: Environment | None) -> Any:
     data = mujoco.MjData(model)
     data.qpos[3:7], data.qvel[3:6], data.qvel[6:] = [0.8, -0.2, 0.4, 0.4], [0.01, 0.02, 0.03], 50.0
     if outside is not None:
-        data.userdata[:] = install.userdata(model, outside, {})
+        data.userdata[:] = userdata(model, outside)
     return data
 
 
@@ -48,7 +50,7 @@ def microseconds_per_step(model: Any, data: Any) -> float:
 
 
 def main() -> None:
-    size = max(install.userdata_size(outside, {}) for outside in CASES.values())
+    size = max(userdata_size(outside) for outside in CASES.values())
     model = vehicle.build(PlantTable(), Rates(), userdata=size).model
     print(f"mujoco {mujoco.__version__}, RK4, {PAIRS} pairs of {STEPS} steps of 1 ms")
     print(f"{'environment':<26}{'bare':>9}{'with':>9}{'ratio':>8}   (us per step, medians)")
@@ -59,7 +61,7 @@ def main() -> None:
             mujoco.set_mjcb_passive(None)
             mujoco.set_mjcb_sensor(None)
             without = microseconds_per_step(model, bare)
-            install.install()
+            install_callbacks()
             times.append((without, microseconds_per_step(model, acted_on)))
         pairs = np.array(times)
         without, acted = np.median(pairs, axis=0)

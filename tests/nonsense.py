@@ -6,14 +6,14 @@ import inspect
 import math
 from collections.abc import Iterator
 from functools import cache
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, RootModel
 
 from mjspace.scenario import sensors
 from mjspace.scenario.construct import controllers
-from mjspace.scenario.equipment import type_of
+from mjspace.scenario.declared import tables_in, type_of
 from mjspace.scenario.loading import load, scenario_names
 from mjspace.scenario.scenario import Component, Scenario
 
@@ -119,14 +119,11 @@ def tables() -> dict[type[BaseModel], list[dict[str, Any]]]:
 
 
 def _kinds_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if inspect.isclass(annotation) and issubclass(annotation, BaseModel):
-        if annotation is not Component:
-            yield annotation
-            for field in annotation.model_fields.values():
+    for table in tables_in(annotation):
+        if table is not Component:
+            yield table
+            for field in table.model_fields.values():
                 yield from _kinds_in(type_of(field))
-        return
-    for part in get_args(annotation):
-        yield from _kinds_in(part)
 
 
 def _models_in(value: Any) -> Iterator[BaseModel]:

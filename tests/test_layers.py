@@ -30,7 +30,7 @@ ROOMS = {
     "contract": "ranges units",
     "attitude": "contract",
     "signals": "contract errors",
-    "scenario": "constants contract errors ranges units",
+    "scenario": "contract errors ranges units",
     "vehicle": "contract errors scenario",
     "environment": "constants contract scenario vehicle",
     "sensors": "attitude contract scenario units",

@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mjspace.scenario.construct import controllers
-from mjspace.scenario.equipment import DeclaredIn, type_of
+from mjspace.scenario.declared import DeclaredIn, tables_in, type_of
 from mjspace.scenario.fields import Si
 from mjspace.scenario.scenario import Scenario
 from mjspace.scenario.sensors import KINDS, kinds
@@ -112,10 +112,8 @@ def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseM
             yield from _tables(inner, heading)
 
 
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((t for part in get_args(annotation) if (t := _table_in(part))), None)
+def _table_in(kind: Any) -> type[BaseModel] | None:
+    return next(tables_in(kind), None)
 
 
 def _value(field: FieldInfo) -> str:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mjspace.contract import Array, Measurement
-from mjspace.environment.kernel import MOMENT
+from mjspace.environment.magnetic_field import MOMENT
 from mjspace.scenario.equipment import Driven, Equipment
 from mjspace.scenario.plant import Initial, Rates
 from mjspace.vehicle.vehicle import Vehicle

@@ -20,7 +20,7 @@ from mjspace import attitude
 from mjspace.contract import Array, DesiredMotion, Event, Measurement
 from mjspace.dm_env import bridge
 from mjspace.dm_env.action import Action
-from mjspace.environment import install
+from mjspace.environment.install import install_callbacks
 from mjspace.errors import InputError
 from mjspace.scenario import loading
 from mjspace.simulation.assembly import Assembly, assemble
@@ -79,7 +79,7 @@ class Physics(bridge.Physics):  # type: ignore[misc]
 
     def reset(self, keyframe_id: int | None = None) -> None:
         """Return to the scenario's start; the vehicle has no keyframes."""
-        install.install()
+        install_callbacks()
         for name in self._changed:
             _field(self.model.ptr, name)[...] = _field(self._assembly.vehicle.model, name)
         super().reset(keyframe_id)

@@ -1,14 +1,21 @@
 """Dry friction of bearings, smoothed so that it comes to rest with any integration step."""
 
+import math
 import warnings
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, ClassVar, Self
 
 import mujoco
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.environment.base import Term
+from mjspace.environment.bodies import Bodies
+from mjspace.environment.compiled import compiled
+from mjspace.environment.joints import hinge
+from mjspace.scenario.environment import Environment
 from mjspace.scenario.hinges import Friction
+from mjspace.scenario.plant import PlantTable
 from mjspace.vehicle.model_checks import ModelWarning
 from mjspace.vehicle.stability import mass_matrix
 
@@ -21,31 +28,60 @@ _RK4, _OTHERS = 0.72 * 2.785, 0.5 * 2.0
 for an inertia that changes with the configuration and, with Euler, does not overshoot."""
 _LEAST = 0.1
 """The same where viscous friction leaves no room."""
-WIDTH = 5
-"""How many numbers ``pack`` makes of each hinge."""
 
 
-def pack(model: Any, frictions: Mapping[str, Friction], dofs: Sequence[int]) -> Array:
-    """Return five numbers for each hinge: dof, c, b - c, Stribeck's speed, smoothing speed.
+@compiled
+def friction(hinges: Any, time: float, bodies: Bodies) -> None:
+    """Add dry friction [N m] to hinges, as ``BearingFriction.pack`` packs it."""
+    for i in range(0, hinges.size, 5):
+        dof, torque = int(hinges[i]), hinges[i + 1]
+        speed = bodies.qvel[dof]
+        if hinges[i + 2] > 0.0:
+            torque += hinges[i + 2] * math.exp(-((speed / hinges[i + 3]) ** 2))
+        bodies.qfrc_passive[dof] -= torque * math.tanh(speed / hinges[i + 4])
 
-    Warns:
-        ModelWarning: the step is so long that the breakaway friction is smoothed away.
-    """
-    rows = []
-    speeds = smoothing(model, list(frictions.values()), dofs)
-    for (name, friction), dof, speed in zip(frictions.items(), dofs, speeds, strict=True):
-        excess, stribeck = friction.steepest - friction.coulomb, friction.stribeck_speed or 1.0
-        if excess > 0.0 and speed > 3.0 * OF_STRIBECK * stribeck:
-            step = model.opt.timestep * 3.0 * OF_STRIBECK * stribeck / speed
-            warnings.warn(
-                f"hinge {name!r}: a step of {model.opt.timestep:g} s smooths its friction over "
-                f"{speed:.3g} rad/s, too wide for a stribeck_speed of {stribeck:g} rad/s: under "
-                f"93 % of its breakaway_friction acts; take a step below {step:.2g} s",
-                ModelWarning,
-                stacklevel=2,
-            )
-        rows.append([dof, friction.coulomb, excess, stribeck, speed])
-    return np.ravel(rows)
+
+class BearingFriction(Term):
+    """The dry friction of every hinge that has some, by its name."""
+
+    kernels: ClassVar = {8: friction}
+
+    frictions: dict[str, Friction]
+
+    @classmethod
+    def of(cls, plant: PlantTable) -> list[Self]:
+        """Return the dry friction of the plant's wheels and hinges; nothing where there is none."""
+        rough = {name: f for name, hinge in plant.hinges.items() if (f := hinge.friction)}
+        for fitted in plant.equipment.values():
+            rough = fitted.dry_friction() | rough
+        return [cls(frictions=rough)] if rough else []
+
+    def payload_size(self) -> int:
+        """Return five numbers for each hinge."""
+        return 5 * len(self.frictions)
+
+    def pack(self, model: Any, environment: Environment) -> Array:
+        """Return dof, c, b - c, Stribeck's speed and the smoothing speed of each.
+
+        Warns:
+            ModelWarning: the step is so long that the breakaway friction is smoothed away.
+        """
+        rows = []
+        dofs = [hinge(model, name)[0] for name in self.frictions]
+        speeds = smoothing(model, list(self.frictions.values()), dofs)
+        for (name, friction), dof, speed in zip(self.frictions.items(), dofs, speeds, strict=True):
+            excess, stribeck = friction.steepest - friction.coulomb, friction.stribeck_speed or 1.0
+            if excess > 0.0 and speed > 3.0 * OF_STRIBECK * stribeck:
+                step = model.opt.timestep * 3.0 * OF_STRIBECK * stribeck / speed
+                warnings.warn(
+                    f"hinge {name!r}: a step of {model.opt.timestep:g} s smooths its friction over "
+                    f"{speed:.3g} rad/s, too wide for a stribeck_speed of {stribeck:g} rad/s: "
+                    f"under 93 % of its breakaway_friction acts; take a step below {step:.2g} s",
+                    ModelWarning,
+                    stacklevel=2,
+                )
+            rows.append([dof, friction.coulomb, excess, stribeck, speed])
+        return np.ravel(rows)
 
 
 def smoothing(model: Any, frictions: Sequence[Friction], dofs: Sequence[int]) -> Array:

@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-from numba import njit
+from mjspace.environment.compiled import compiled
 
 EARTH_ROTATION = 7.292115e-5  # rad/s; Moritz 2000, Geodetic Reference System 1980
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def dipole(place: Any, north: Any, strength: float) -> tuple[float, float, float]:
     """Return the field [T] at ``place`` [m] from the planet's centre.
 
@@ -23,7 +23,7 @@ def dipole(place: Any, north: Any, strength: float) -> tuple[float, float, float
     return scale * (north[0] - up * x), scale * (north[1] - up * y), scale * (north[2] - up * z)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def northern_pole(
     time: float, tilt: float, longitude: float, rotation: float
 ) -> tuple[float, float, float]:

@@ -14,8 +14,8 @@ from scipy.interpolate import CubicSpline
 
 from mjspace.contract import Array
 from mjspace.environment import dipole, kepler
+from mjspace.environment.magnetic_field import MagneticField
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.magnetics import MagneticField
 from mjspace.scenario.plant import Rates
 
 SPACING = 10.0
@@ -86,10 +86,10 @@ def along(environment: Environment, rates: Rates, duration: float) -> FieldAlong
     table, orbit = environment.magnetic_field, environment.orbit
     if table is None or orbit is None:
         return None
-    packed = kepler.pack(orbit)
+    elements = orbit.elements()
     spacing = rates.control * max(1.0, math.floor(SPACING / rates.control))
     time: Array = spacing * np.arange(max(4.0, math.ceil(duration / spacing) + 2.0))
-    places = np.array([kepler.position(packed, instant) for instant in time])
+    places = np.array([kepler.position(elements, instant) for instant in time])
     spline = CubicSpline(time, field_at(table, places, time))
     factors = np.moveaxis(spline.c, 0, 1).reshape(-1, 12)
     return FieldAlongOrbit(spacing, np.column_stack([time[:-1], factors]))

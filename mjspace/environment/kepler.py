@@ -4,37 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from mjspace.constants import GM
-from mjspace.contract import Array
-from mjspace.scenario.environment import Orbit
+from mjspace.environment.compiled import compiled
 
 
-def pack(orbit: Orbit) -> Array:
-    """Return the orbit as ten numbers.
-
-    GM [m^3/s^2], mean motion [rad/s], mean anomaly at time zero [rad], eccentricity, then the two
-    semi-axes as vectors [m], towards the periapsis and along the motion there.
-    """
-    a, e = orbit.semi_major_axis, orbit.eccentricity
-    gm = GM[orbit.body]
-    half = math.atan2(
-        math.sqrt(1.0 - e) * math.sin(0.5 * orbit.true_anomaly),
-        math.sqrt(1.0 + e) * math.cos(0.5 * orbit.true_anomaly),
-    )
-    mean_anomaly = 2.0 * half - e * math.sin(2.0 * half)
-    # columns: towards the ascending node and 90 deg ahead of it in the orbit
-    node, tilt = orbit.ascending_node, orbit.inclination
-    ahead = [-math.sin(node) * math.cos(tilt), math.cos(node) * math.cos(tilt), math.sin(tilt)]
-    plane = np.column_stack([[math.cos(node), math.sin(node), 0.0], ahead])
-    cosine, sine = math.cos(orbit.periapsis), math.sin(orbit.periapsis)
-    major = a * plane @ [cosine, sine]
-    minor = a * math.sqrt(1.0 - e * e) * plane @ [-sine, cosine]
-    return np.array([gm, math.sqrt(gm / a**3), mean_anomaly, e, *major, *minor])
-
-
-@njit(cache=True, error_model="numpy")
+@compiled
 def eccentric_anomaly(mean: float, eccentricity: float) -> float:
     """Return the root E of Kepler's equation, E - eccentricity sin E = mean [rad], in [-pi, pi].
 
@@ -52,11 +26,11 @@ def eccentric_anomaly(mean: float, eccentricity: float) -> float:
         root = lower
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def position(orbit: Any, time: float) -> tuple[float, float, float]:
     """Return the position [m], inertial axes from the planet's centre, at ``time`` [s].
 
-    ``orbit`` is what ``pack`` returns.
+    ``orbit`` is what ``Orbit.elements`` returns.
     """
     anomaly = eccentric_anomaly(orbit[2] + orbit[1] * time, orbit[3])
     along, across = math.cos(anomaly) - orbit[3], math.sin(anomaly)
@@ -67,7 +41,7 @@ def position(orbit: Any, time: float) -> tuple[float, float, float]:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
     """Return the velocity [m/s], inertial axes, at ``time`` [s]; ``orbit`` as for ``position``."""
     anomaly = eccentric_anomaly(orbit[2] + orbit[1] * time, orbit[3])

@@ -7,9 +7,8 @@ import numpy as np
 
 from mjspace import attitude
 from mjspace.contract import Array
-from mjspace.environment.install import orbit_position
+from mjspace.environment.orbit import Orbit, orbit_position
 from mjspace.rendering.plume import Plume
-from mjspace.scenario.environment import Orbit
 
 _GEOM = mujoco.mjtObj.mjOBJ_GEOM
 AXES = 3

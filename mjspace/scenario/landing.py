@@ -1,25 +1,11 @@
-"""The tables of a landing in a scenario: gravity at the site, and the ground."""
+"""The table of the ground in a scenario."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
-from mjspace.scenario.fields import NonNegative, Positive, Si, Table, WithinTurn
-
-
-class CentralGravity(Table):
-    """A planet's gravity on every body, in the frame of a landing site.
-
-    The frame's origin is on the sphere of the planet's radius, z up; it does not turn.
-    """
-
-    body: Literal["earth", "moon"] = "moon"
-    """What is landed on."""
-    gm: Annotated[Positive, Si("m^3/s^2")] | None = None
-    """Gravitational parameter; the body's when left out."""
-    radius: Annotated[Positive, Si("m")] | None = None
-    """From the planet's centre to the origin; the body's when left out."""
+from mjspace.scenario.fields import NonNegative, Si, Table, WithinTurn
 
 
 class Ground(Table):

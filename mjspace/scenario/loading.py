@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import tomli_w
 from pydantic import BaseModel, ValidationError
@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from mjspace.errors import InputError, nearest
 from mjspace.scenario import overrides as keys
 from mjspace.scenario.construct import plain
-from mjspace.scenario.equipment import type_of
+from mjspace.scenario.declared import tables_in, type_of
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.sensors import kinds
 
@@ -213,14 +213,9 @@ def _keys_at(parents: list[Any]) -> list[str]:
     for part in parents:
         if isinstance(part, int) or model is None:
             continue
-        model = _model_in(type_of(model.model_fields[part])) if part in model.model_fields else None
+        field = model.model_fields.get(part)
+        model = None if field is None else next(tables_in(type_of(field)), None)
     return list(model.model_fields) if model is not None else []
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((m for a in get_args(annotation) if (m := _model_in(a)) is not None), None)
 
 
 def _without_none(value: Any) -> Any:

@@ -4,8 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from mjspace.scenario.deployments import Deployment
-from mjspace.scenario.equipment import DeclaredIn, declaration
+from mjspace.scenario.declared import DeclaredIn, declaration
 from mjspace.scenario.fields import (
     Angles3,
     Finite,
@@ -21,7 +20,6 @@ from mjspace.scenario.fields import (
     Si,
     Table,
     Velocity3,
-    WithinTurn,
 )
 from mjspace.scenario.hinges import Hinge
 from mjspace.scenario.landing import Ground
@@ -47,17 +45,6 @@ class Rates(Table):
 _WHEELS = DeclaredIn("mjspace.actuators.reaction_wheels:Wheels", optional=False)
 
 
-class Ripple(Table):
-    """A motor's torque ripple: amplitude cos(cycles angle + phase) on its hinge, with reaction."""
-
-    amplitude: Annotated[NonNegative, Si("N m")]
-    """Largest torque."""
-    cycles: NonNegative
-    """In a turn of the hinge; a fraction makes a ripple slower than the turn."""
-    phase: WithinTurn = 0.0
-    """At angle zero."""
-
-
 class Part(Table):
     """Something bolted to the bus that moves of itself: a nutation damper, a boom, a yo-yo."""
 
@@ -67,7 +54,7 @@ class Part(Table):
     """Of its origin in the bus."""
     euler: Angles3 = [0.0, 0.0, 0.0]
     """Roll, pitch, yaw of its axes in the bus's."""
-    deployment: Deployment | None = None
+    deployment: Annotated[Any, DeclaredIn("mjspace.vehicle.deployments:Deployment")] = None
     """Of a boom or a yo-yo; it moves as it likes when left out."""
 
     @model_validator(mode="after")
@@ -107,7 +94,10 @@ class PlantTable(Table):
     to neither ``gyrostat_inertia`` nor the ``inertia`` that a law is given."""
     hinges: dict[Name, Hinge] = {}
     """Bearings of the parts' hinges, by the hinge: ``[plant.hinges.cmg_wheel]``."""
-    ripple: dict[Name, Ripple] = {}
+    ripple: dict[
+        Name,
+        Annotated[Any, DeclaredIn("mjspace.environment.torque_ripple:Ripple", optional=False)],
+    ] = {}
     """Torque ripple of motors, by the hinge."""
     ground: Ground | None = None
     """What is below it; nothing when left out."""

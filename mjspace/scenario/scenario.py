@@ -15,8 +15,8 @@ from pydantic import (
 
 from mjspace.contract import TICK
 from mjspace.ranges import numbers
+from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.equipment import DeclaredIn
 from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
@@ -161,7 +161,7 @@ class Scenario(Table):
     rates: Rates = Rates()
     plant: PlantTable = Field(default_factory=PlantTable)
     initial: Initial = Initial()
-    environment: Environment = Environment()
+    environment: Environment = Field(default_factory=Environment)
     sensors: Sensors = Field({}, validate_default=True)
     """By name. Attitude, rate and wheel speed are measured ideally where no sensor is declared."""
     reference: Component

@@ -13,12 +13,11 @@ from mjspace.actuators.actuator_set import ActuatorSet
 from mjspace.actuators.base import Actuator, Context
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array, Law, ReferenceSource
-from mjspace.environment import central_gravity, install, kepler
 from mjspace.environment.geomagnetism import FieldAlongOrbit, along
+from mjspace.environment.install import userdata, userdata_size
+from mjspace.environment.orbit import orbit_position
 from mjspace.errors import input_error_at
 from mjspace.scenario.construct import construct, load_object
-from mjspace.scenario.hinges import Friction
-from mjspace.scenario.plant import PlantTable
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import Surroundings
@@ -74,11 +73,12 @@ class Assembly:
     @property
     def surroundings(self) -> Surroundings:
         """What the sensors need to know of the vehicle and of where it flies."""
+        orbit = self.scenario.environment.orbit
         return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
             gravity=self._gravity,
             magnetic_field=None if self.field is None else self.field.at,
-            orbit_position=None if self.scenario.environment.orbit is None else self._on_orbit,
+            orbit_position=None if orbit is None else partial(orbit_position, orbit),
         )
 
     @property
@@ -110,15 +110,8 @@ class Assembly:
         table = self.scenario.environment.gravity
         if table is None:
             return np.zeros_like(position)
-        return central_gravity.acceleration(central_gravity.pack(table), position)
-
-    def _on_orbit(self, time: Array) -> Array:
-        """Return the position on the orbit [m], inertial axes, (..., 3), at each ``time`` [s]."""
-        table = self.scenario.environment.orbit
-        assert table is not None
-        orbit = kepler.pack(table)
-        places = [kepler.position(orbit, float(instant)) for instant in np.ravel(time)]
-        return np.array(places).reshape(*np.shape(time), 3)
+        acceleration: Array = table.acceleration(position)
+        return acceleration
 
 
 def assemble(
@@ -132,9 +125,7 @@ def assemble(
     Raises:
         InputError: a part cannot be built, with the scenario's key and what would be right.
     """
-    friction = _friction(scenario.plant)
-    ripple = scenario.plant.ripple
-    size = install.userdata_size(scenario.environment, friction, ripple)
+    size = userdata_size(scenario.environment, scenario.plant)
     vehicle = _part("plant", partial(build, userdata=size), scenario.plant, scenario.rates)
     facts = {
         "inertia": vehicle.inertia,
@@ -171,11 +162,10 @@ def assemble(
         qvel=qvel,
         userdata=_part(
             "environment",
-            install.userdata,
+            userdata,
             vehicle.model,
             scenario.environment,
-            friction,
-            ripple,
+            scenario.plant,
         ),
         field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
         actuators=_part("plant", _actuators, vehicle, scenario, inner=inner),
@@ -258,16 +248,7 @@ def _gravity_at_start(scenario: Scenario) -> float:
     if (around := scenario.environment.gravity) is None:
         return 0.0
     place = np.array(scenario.initial.position, dtype=float)
-    pull = central_gravity.acceleration(central_gravity.pack(around), place)
-    return float(np.linalg.norm(pull))
-
-
-def _friction(table: PlantTable) -> dict[str, Friction]:
-    """Return the dry friction of the hinges that have some, by name."""
-    of_equipment = [fitted.dry_friction() for fitted in table.equipment.values()]
-    every = {name: hinge.friction for name, hinge in table.hinges.items()}
-    of_parts = {name: friction for name, friction in every.items() if friction is not None}
-    return {name: f for some in (*of_equipment, of_parts) for name, f in some.items()}
+    return float(np.linalg.norm(around.acceleration(place)))
 
 
 def _part(key: str, build: Callable[..., Any], *arguments: Any, **named: Any) -> Any:

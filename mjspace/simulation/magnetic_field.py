@@ -3,7 +3,7 @@
 from typing import Any, ClassVar, Self
 
 from mjspace.environment.geomagnetism import FieldAlongOrbit
-from mjspace.environment.kernel import FIELD
+from mjspace.environment.magnetic_field import FIELD
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 

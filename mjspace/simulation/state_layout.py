@@ -48,7 +48,7 @@ class StateLayout:
             if quantity not in ALWAYS and not sensor.integrates
         }
         orbit = assembly.scenario.environment.orbit
-        self.orbit = None if orbit is None else kepler.pack(orbit)
+        self.orbit = None if orbit is None else orbit.elements()
 
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors report, as views of the state rows where that is possible.

@@ -9,7 +9,7 @@ from mujoco.batch import Batch, SimulationError
 
 from mjspace import attitude
 from mjspace.contract import Array, Measurement
-from mjspace.environment import install
+from mjspace.environment.install import install_callbacks
 from mjspace.errors import FlightError, InputError
 from mjspace.simulation import mujoco_warnings
 from mjspace.simulation.assembly import Assembly
@@ -43,7 +43,7 @@ class Stepper:
     ) -> None:
         """Put the ``members`` of the campaign at ``start``; ``inner`` is the law's inner loop."""
         mujoco_warnings.silence()
-        install.install()
+        install_callbacks()
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
         self.batch.state[:] = start.physics
         for name, values in start.model.items():

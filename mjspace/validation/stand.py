@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.environment import install as environment
+from mjspace.environment.install import install_callbacks, userdata, userdata_size
 from mjspace.scenario.environment import Environment
 from mjspace.validation.benchmark import Conditions, Fault
 
@@ -55,7 +55,7 @@ def build(
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     spec.option.timestep = conditions.step
     if outside is not None:
-        spec.nuserdata = environment.userdata_size(outside, {})
+        spec.nuserdata = userdata_size(outside)
     model = spec.compile()
     _inject(model, conditions.fault)
     return model
@@ -64,9 +64,9 @@ def build(
 def start(model: Any, outside: Environment | None = None) -> Any:
     """Return a new ``MjData``, with ``outside`` as mjspace's native environment if it is set."""
     data = mujoco.MjData(model)
-    environment.install()
+    install_callbacks()
     if outside is not None:
-        data.userdata[:] = environment.userdata(model, outside, {})
+        data.userdata[:] = userdata(model, outside)
     return data
 
 
@@ -108,7 +108,7 @@ def fly(
             if not np.all(np.isfinite(data.qvel)):
                 break
     finally:
-        environment.install()
+        install_callbacks()
     time, qpos, qvel = map(np.array, zip(*rows, strict=True))
     return Record(model, time, qpos, qvel)
 
@@ -126,7 +126,7 @@ def joined(*records: Record) -> Record:
 
 def _installer(load: Load | None) -> Callable[[], None]:
     if load is None:
-        return environment.install
+        return install_callbacks
 
     def passive(model: Any, data: Any) -> None:
         half = 0.5 * model.opt.timestep

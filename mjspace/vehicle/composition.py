@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 
 from mjspace.errors import input_error_at, nearest
-from mjspace.scenario.deployments import Deployment
 from mjspace.scenario.hinges import Hinge
 from mjspace.scenario.landing import Ground
 from mjspace.scenario.plant import Part, PlantTable
 from mjspace.vehicle import ground_contact, mass_properties
+from mjspace.vehicle.deployments import Deployment
 
 ASSETS = Path(str(files("mjspace.assets")))
 """The folder of the models and their parts."""

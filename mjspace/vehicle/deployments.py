@@ -1,16 +1,35 @@
 """Parts that are deployed in flight: booms driven out on their slides, yo-yos that despin."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
 from mjspace.contract import TICK, Array, Event
-from mjspace.scenario.deployments import Deployment
+from mjspace.scenario.fields import Positive, Si, Table, Time
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 GONE = 1e-12
 """kg left of a weight that was let go: it flies on without being felt."""
+
+
+class Deployment(Table):
+    """When a boom or a yo-yo goes out, and how."""
+
+    at: Time
+    """When it begins; until then it is held."""
+    length: Annotated[Positive, Si("m")] | None = None
+    """Of a boom: where its tip goes, from the part's origin."""
+    rate: Annotated[Positive, Si("m/s")] | None = None
+    """Of a boom: how fast."""
+    ramp: Time = 0.0
+    """Of a boom: for how long the rate grows evenly, and falls again at the end."""
+    bandwidth: Annotated[Positive, Si("rad/s")] = 1.0
+    """Of the boom's position loop, critically damped: well above the spin, or the pull on the tip
+    wins; well below one over the integration step."""
+    unwound: Annotated[Positive, Si("rad")] = 0.1
+    """Of a yo-yo: cord off the drum while it is held. With none, turning and sliding would be one
+    motion."""
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,14 @@ from scipy.integrate import solve_ivp
 from mjspace import attitude
 from mjspace.actuators.magnetorquers import CoilSet
 from mjspace.contract import Array, Measurement
-from mjspace.environment import install
-from mjspace.environment.kernel import FIELD, MOMENT
+from mjspace.environment.install import install_callbacks, userdata, userdata_size
+from mjspace.environment.magnetic_field import FIELD, MOMENT, MagneticField
+from mjspace.environment.orbit import Orbit
 from mjspace.errors import InputError
 from mjspace.runner.replay import verify
 from mjspace.runner.run import run
-from mjspace.scenario.environment import Environment, Orbit
+from mjspace.scenario.environment import Environment
 from mjspace.scenario.loading import load
-from mjspace.scenario.magnetics import MagneticField
 from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
@@ -40,13 +40,13 @@ STRONG = np.array([60.0, -90.0, 40.0])  # A m^2
 
 
 def compiled(step: float) -> tuple[Any, Any]:
-    install.install()
+    install_callbacks()
     spec = mujoco.MjSpec.from_string(BALL)
     spec.option.timestep = step
-    spec.nuserdata = install.userdata_size(OUTSIDE, {})
+    spec.nuserdata = userdata_size(OUTSIDE)
     model = spec.compile()
     data = mujoco.MjData(model)
-    data.userdata[:] = install.userdata(model, OUTSIDE, {})
+    data.userdata[:] = userdata(model, OUTSIDE)
     data.userdata[FIELD], data.userdata[MOMENT] = PIECE, STRONG
     data.qpos[3:7] = START
     return model, data

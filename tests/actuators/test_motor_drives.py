@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from mjspace.actuators.motor_drives import DriveTables
-from mjspace.environment import install
+from mjspace.environment.install import install_callbacks, userdata, userdata_size
+from mjspace.environment.torque_ripple import Ripple
 from mjspace.errors import FlightError, InputError
 from mjspace.log.reader import Log
 from mjspace.runner.replay import replay, verify
 from mjspace.runner.run import run
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.loading import load
-from mjspace.scenario.plant import Ripple
+from mjspace.scenario.plant import PlantTable
 from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
@@ -108,13 +109,13 @@ def test_ripple_is_a_torque_on_its_hinge_and_against_what_carries_it() -> None:
         <body><joint name="wheel" axis="0 0 1"/>
           <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.2"/></body></body>
       </worldbody></mujoco>"""
-    ripple = {"wheel": Ripple(amplitude=0.3, cycles=0.5, phase=3.0)}
+    plant = PlantTable(ripple={"wheel": Ripple(amplitude=0.3, cycles=0.5, phase=3.0)})
     spec = mujoco.MjSpec.from_string(xml)
-    spec.nuserdata = install.userdata_size(Environment(), {}, ripple)
+    spec.nuserdata = userdata_size(Environment(), plant)
     model = spec.compile()
     data = mujoco.MjData(model)
-    install.install()
-    data.userdata[:] = install.userdata(model, Environment(), {}, ripple)
+    install_callbacks()
+    data.userdata[:] = userdata(model, Environment(), plant)
     data.qpos[7] = 2.5
     mujoco.mj_forward(model, data)
     torque = 0.3 * np.cos(0.5 * 2.5 + 3.0)

@@ -17,7 +17,7 @@ from mjspace.actuators.reaction_wheels import ReactionWheels
 from mjspace.contract import Array
 from mjspace.errors import FlightError
 from mjspace.runner.run import Result, fly_to_log
-from mjspace.scenario.equipment import DeclaredIn, type_of
+from mjspace.scenario.declared import DeclaredIn, type_of
 from mjspace.scenario.loading import load
 from mjspace.scenario.plant import PlantTable
 from mjspace.scenario.scenario import Scenario

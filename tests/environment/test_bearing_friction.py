@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from mjspace.contract import Array
-from mjspace.environment import install
-from mjspace.environment.bearing_friction import pack
+from mjspace.environment.bearing_friction import BearingFriction
+from mjspace.environment.install import install_callbacks, userdata, userdata_size
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.hinges import Bearing, Friction
+from mjspace.scenario.hinges import Bearing, Friction, Hinge
+from mjspace.scenario.plant import PlantTable
 from mjspace.vehicle.model_checks import ModelWarning
 
 WHEEL = """<mujoco><option gravity="0 0 0" integrator="{integrator}" timestep="{step}">
@@ -27,7 +28,7 @@ ROTOR = """<body><joint name="wheel_{i}" axis="{axis}" damping="{damping}"/>
 
 @pytest.fixture(autouse=True, scope="module")
 def _installed() -> None:
-    install.install()
+    install_callbacks()
 
 
 def spun(
@@ -48,11 +49,16 @@ def spun(
     )
     text = WHEEL.format(integrator=integrator, step=step, bus=bus, wheels=wheels)
     spec = mujoco.MjSpec.from_string(text)
-    frictions = dict.fromkeys(names, friction)
-    spec.nuserdata = install.userdata_size(Environment(), frictions)
+    hinge = Hinge(
+        coulomb_friction=friction.coulomb,
+        breakaway_friction=friction.breakaway,
+        stribeck_speed=friction.stribeck_speed,
+    )
+    plant = PlantTable(hinges=dict.fromkeys(names, hinge))
+    spec.nuserdata = userdata_size(Environment(), plant)
     model = spec.compile()
     data = mujoco.MjData(model)
-    data.userdata[:] = install.userdata(model, Environment(), frictions)
+    data.userdata[:] = userdata(model, Environment(), plant)
     data.qvel[6:] = speeds
     return model, data
 
@@ -85,7 +91,8 @@ def test_it_comes_to_rest_with_any_step(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         model, data = spun(friction, [start], step=step, bus=bus)
-        smoothing = pack(model, {"wheel_0": friction}, [6])[4]
+        term = BearingFriction(frictions={"wheel_0": friction})
+        smoothing = term.pack(model, Environment())[4]
     energy, momentum = energy_and_momentum(model, data)
     # Near zero it decays as exp(-c t / (J smoothing)), by RK4's 1/3 and not 1/e^2 in a step of two
     # of these times: 25 of them are 1e-6 of the smoothing speed.

@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 from mjspace import attitude
 from mjspace.constants import GM, RADIUS
 from mjspace.contract import Array
-from mjspace.environment import central_gravity, install
+from mjspace.environment.gravity import CentralGravity
+from mjspace.environment.install import install_callbacks, userdata, userdata_size
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.landing import CentralGravity
 
 PAPER = CentralGravity(gm=4.902e12, radius=1738e3)
 SMALL = CentralGravity(gm=4.0e3, radius=50.0)  # an asteroid, where the gradient can be seen
@@ -26,23 +26,23 @@ BODY = """<mujoco><option integrator="RK4" gravity="0 0 0">
 
 @pytest.fixture(autouse=True, scope="module")
 def _installed() -> None:
-    install.install()
+    install_callbacks()
 
 
 def compiled(gravity: CentralGravity, step: float) -> tuple[Any, Any]:
     outside = Environment(gravity=gravity)
     spec = mujoco.MjSpec.from_string(BODY)
     spec.option.timestep = step
-    spec.nuserdata = install.userdata_size(outside, {})
+    spec.nuserdata = userdata_size(outside)
     model = spec.compile()
     data = mujoco.MjData(model)
-    data.userdata[:] = install.userdata(model, outside, {})
+    data.userdata[:] = userdata(model, outside)
     return model, data
 
 
 def fall(gravity: CentralGravity, start: Array, duration: float) -> Array:
     """Return Newton's and Euler's motion, written down without MuJoCo or our code."""
-    gm, radius = central_gravity.pack(gravity)
+    gm, radius = gravity.parameters()
     centre = np.array([0.0, 0.0, -radius])
 
     def slope(_: float, y: Array) -> Array:
@@ -82,10 +82,10 @@ def test_a_tumbling_body_falls_as_newton_says(
 
 
 def test_at_the_site_it_is_gm_over_the_radius_squared_downwards() -> None:
-    packed = central_gravity.pack(CentralGravity())
-    np.testing.assert_array_equal(packed, [GM["moon"], RADIUS["moon"]])
-    there = central_gravity.acceleration(packed, np.zeros((2, 3)))
+    site = CentralGravity()
+    np.testing.assert_array_equal(site.parameters(), [GM["moon"], RADIUS["moon"]])
+    there = site.acceleration(np.zeros((2, 3)))
     np.testing.assert_allclose(there, [[0.0, 0.0, -1.6242]] * 2, atol=5e-5)
     # Beside the site it points to the centre, not down.
-    aside = central_gravity.acceleration(packed, np.array([2500.0, 0.0, 0.0]))
+    aside = site.acceleration(np.array([2500.0, 0.0, 0.0]))
     assert aside[0] == pytest.approx(-1.6242 * 2500.0 / 1737400.0, rel=1e-4)

@@ -13,10 +13,13 @@ from scipy.special import ellipk
 from mjspace import attitude
 from mjspace.constants import GM
 from mjspace.contract import Array
-from mjspace.environment import install
-from mjspace.environment.kernel import MAGIC
-from mjspace.scenario.environment import DisturbanceTorque, Environment, Orbit, Sine
-from mjspace.scenario.hinges import Friction
+from mjspace.environment.base import MAGIC
+from mjspace.environment.disturbance_torque import DisturbanceTorque, Sine
+from mjspace.environment.install import install_callbacks, userdata, userdata_size
+from mjspace.environment.orbit import Orbit, orbit_position
+from mjspace.scenario.environment import Environment
+from mjspace.scenario.hinges import Hinge
+from mjspace.scenario.plant import PlantTable
 
 CIRCULAR = Orbit(semi_major_axis=7.0e6)
 ELLIPTIC = Orbit(
@@ -68,23 +71,29 @@ CHAIN = f"""<mujoco>{OPTION}
 
 @pytest.fixture(autouse=True, scope="module")
 def _installed() -> None:
-    install.install()
+    install_callbacks()
 
 
 def compiled(
     xml: str,
     outside: Environment,
-    friction: Mapping[str, Friction] | None = None,
+    plant: PlantTable | None = None,
     step: float = 1.0,
 ) -> tuple[Any, Any]:
     """Return the model of ``xml`` and its data, whose userdata asks for this environment."""
     spec = mujoco.MjSpec.from_string(xml)
     spec.option.timestep = step
-    spec.nuserdata = install.userdata_size(outside, friction or {})
+    spec.nuserdata = userdata_size(outside, plant)
     model = spec.compile()
     data = mujoco.MjData(model)
-    data.userdata[:] = install.userdata(model, outside, friction or {})
+    data.userdata[:] = userdata(model, outside, plant)
     return model, data
+
+
+def rough(friction: Mapping[str, float]) -> PlantTable:
+    """Return a plant with this Coulomb friction [N m] of its hinges."""
+    hinges = {name: Hinge(coulomb_friction=torque) for name, torque in friction.items()}
+    return PlantTable(hinges=hinges)
 
 
 def axes(quaternion: Array) -> Array:
@@ -108,7 +117,7 @@ def two_body(place: Array, orbit: Orbit) -> Array:
 def velocity_at(orbit: Orbit, time: float) -> Array:
     """Return the orbital velocity [m/s], from a central difference of eighth order."""
     weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
-    return weights @ install.orbit_position(orbit, time + 10.0 * np.arange(-4, 5)) / 10.0
+    return weights @ orbit_position(orbit, time + 10.0 * np.arange(-4, 5)) / 10.0
 
 
 def libration(orbit: Orbit, rate: Array, duration: float) -> Array:
@@ -126,7 +135,7 @@ def libration(orbit: Orbit, rate: Array, duration: float) -> Array:
         q_dot = 0.5 * np.concatenate([[-q[1:] @ w], q[0] * w + np.cross(q[1:], w)])
         return np.concatenate([velocity, two_body(place, orbit), q_dot, w_dot])
 
-    start = [*install.orbit_position(orbit, 0.0), *velocity_at(orbit, 0.0), *TUMBLING, *rate]
+    start = [*orbit_position(orbit, 0.0), *velocity_at(orbit, 0.0), *TUMBLING, *rate]
     return solve_ivp(motion, (0.0, duration), start, "DOP853", rtol=1e-13, atol=1e-13).y[6:10, -1]
 
 
@@ -193,7 +202,7 @@ def test_gradient_torque_of_one_body(orbit: Orbit) -> None:
     model, data = compiled(BODY, Environment(orbit=orbit))
     data.qpos[3:7], data.time = TUMBLING, 700.0
     mujoco.mj_forward(model, data)
-    place = install.orbit_position(orbit, 700.0)
+    place = orbit_position(orbit, 700.0)
     up = axes(TUMBLING).T @ place / np.linalg.norm(place)
     wanted = 3.0 * GM[orbit.body] / np.linalg.norm(place) ** 3 * np.cross(up, INERTIA @ up)
     np.testing.assert_array_equal(data.qfrc_passive[:3], 0.0)
@@ -228,7 +237,7 @@ def test_every_dof_takes_its_share() -> None:
     mujoco.mj_integratePos(model, data.qpos, generator.normal(size=model.nv), 1.0)
     data.time = 40.0
     mujoco.mj_forward(model, data)
-    origin = install.orbit_position(ELLIPTIC, 40.0)
+    origin = orbit_position(ELLIPTIC, 40.0)
     wanted = np.zeros(model.nv)
     for body in range(1, model.nbody):
         translation, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
@@ -257,10 +266,10 @@ def test_small_offsets_do_not_cancel() -> None:
 def test_free_fall_beside_the_reference_is_another_kepler_orbit() -> None:
     other = ELLIPTIC.model_copy(update={"eccentricity": 0.304, "inclination": 0.895})
     model, data = compiled(BODY, Environment(orbit=ELLIPTIC), step=2.0)
-    data.qpos[:3] = install.orbit_position(other, 0.0) - install.orbit_position(ELLIPTIC, 0.0)
+    data.qpos[:3] = orbit_position(other, 0.0) - orbit_position(ELLIPTIC, 0.0)
     data.qvel[:3] = velocity_at(other, 0.0) - velocity_at(ELLIPTIC, 0.0)
     mujoco.mj_step(model, data, 7000)
-    wanted = install.orbit_position(other, 14e3) - install.orbit_position(ELLIPTIC, 14e3)
+    wanted = orbit_position(other, 14e3) - orbit_position(ELLIPTIC, 14e3)
     assert np.linalg.norm(wanted) > 1e4
     # velocities good to 1e-10 m/s grow to some 3e-6 m over two orbits; measured 1e-6
     assert np.linalg.norm(data.qpos[:3] - wanted) < 1e-5
@@ -340,7 +349,7 @@ def test_time_is_a_whole_number_of_half_steps() -> None:
 
 def test_coulomb_friction_stops_the_wheel_and_leaves_the_momentum() -> None:
     coefficient, start, rotor, bus = 0.002, 0.9, 0.05, 7.0
-    model, data = compiled(WHEEL, Environment(), {"wheel_0": Friction(coefficient)}, step=0.002)
+    model, data = compiled(WHEEL, Environment(), rough({"wheel_0": coefficient}), step=0.002)
     data.qvel[6] = start
     before = rotor * start
     for duration in (5.0, 10.0, 5.0):
@@ -430,15 +439,15 @@ def test_a_batch_of_different_environments_is_a_loop_of_single_vehicles() -> Non
         )
         return Environment(orbit=orbit if i % 2 else None, torques=[torque] * (i % 4))
 
-    friction = {"wheel_0": Friction(0.003)}
+    plant = rough({"wheel_0": 0.003})
     spec = mujoco.MjSpec.from_string(WHEEL)
-    spec.nuserdata = max(install.userdata_size(outside(i), friction) for i in range(8))
+    spec.nuserdata = max(userdata_size(outside(i), plant) for i in range(8))
     model = spec.compile()
     many = batch.Batch(model, nsim=8, nthread=2)
     singles = [mujoco.MjData(model) for _ in range(8)]
     for i, single in enumerate(singles):
         single.qpos[:3], single.qvel[3:] = [0.3 * i, 1.0, 2.0], [0.1, 0.02 * i, -0.3, 5.0]
-        single.userdata[:] = install.userdata(model, outside(i), friction)
+        single.userdata[:] = userdata(model, outside(i), plant)
         many.qpos[i], many.qvel[i], many.userdata[i] = single.qpos, single.qvel, single.userdata
     for _ in range(20):
         many.step(nstep=10)
@@ -455,31 +464,31 @@ def test_installing_again_restores_the_callback() -> None:
     mujoco.set_mjcb_passive(None)
     mujoco.mj_forward(model, data)
     np.testing.assert_array_equal(data.qfrc_passive, 0.0)
-    install.install()
-    install.install()
+    install_callbacks()
+    install_callbacks()
     mujoco.mj_forward(model, data)
     np.testing.assert_array_equal(data.qfrc_passive[3:], [1.0, 2.0, 3.0])
 
 
-def _small(xml: str, userdata: int = 50) -> Callable[[], Any]:
+def _small(xml: str, numbers: int = 50) -> Callable[[], Any]:
     spec = mujoco.MjSpec.from_string(xml)
-    spec.nuserdata = userdata
+    spec.nuserdata = numbers
     return spec.compile()
 
 
 @pytest.mark.parametrize(
-    ("xml", "userdata", "friction", "message"),
+    ("xml", "numbers", "friction", "message"),
     [
         (f"<mujoco>{OPTION}</mujoco>", 50, {}, "no free joint"),
         (BODY, 5, {}, "nuserdata is 5: 16 are needed"),
-        (WHEEL, 50, {"wheel_9": Friction(0.1)}, "no hinge 'wheel_9'"),
+        (WHEEL, 50, {"wheel_9": 0.1}, "no hinge 'wheel_9'"),
         (BODY.replace('dim="6"', 'dim="5"'), 50, {}, 'dim="6" needstage="vel"'),
         (BODY.replace("vel", "pos"), 50, {}, 'dim="6" needstage="vel"'),
         (BODY.replace("<flag ", '<flag spring="disable" damper="disable" '), 50, {}, "enable one"),
     ],
 )
 def test_models_that_will_not_do(
-    xml: str, userdata: int, friction: dict[str, Friction], message: str
+    xml: str, numbers: int, friction: dict[str, float], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
-        install.userdata(_small(xml, userdata), Environment(orbit=CIRCULAR), friction)
+        userdata(_small(xml, numbers), Environment(orbit=CIRCULAR), rough(friction))

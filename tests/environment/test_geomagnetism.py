@@ -10,8 +10,9 @@ from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.environment import dipole, kepler
 from mjspace.environment.geomagnetism import along, field_at, sidereal_angle
-from mjspace.scenario.environment import Environment, Orbit
-from mjspace.scenario.magnetics import MagneticField
+from mjspace.environment.magnetic_field import MagneticField
+from mjspace.environment.orbit import Orbit
+from mjspace.scenario.environment import Environment
 from mjspace.scenario.plant import Rates
 
 POLAR = Orbit(semi_major_axis=6.978e6, inclination=0.5 * np.pi)
@@ -81,7 +82,7 @@ def test_between_samples(model: str, bound: float) -> None:
     assert found is not None
     assert found.spacing == 10.0
     time = np.append(np.random.default_rng(2).uniform(0.0, 3000.0, 60), 3000.0)
-    places = np.array([kepler.position(kepler.pack(POLAR), t) for t in time])
+    places = np.array([kepler.position(POLAR.elements(), t) for t in time])
     # of 4.5e-5 T: measured 7e-14 and 1.6e-13
     assert np.abs(found.at(time) - field_at(table, places, time)).max() < bound
     # every period lies within one cubic, whatever rounding did to its beginning

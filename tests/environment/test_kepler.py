@@ -5,9 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mjspace.constants import GM
-from mjspace.environment.install import orbit_position
 from mjspace.environment.kepler import eccentric_anomaly
-from mjspace.scenario.environment import Orbit
+from mjspace.environment.orbit import Orbit, orbit_position
 
 
 @pytest.mark.parametrize("eccentricity", [0.0, 1e-9, 0.1, 0.7, 0.99, 0.999999])

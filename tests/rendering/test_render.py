@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mjspace import attitude, run
-from mjspace.environment.install import orbit_position
+from mjspace.environment.orbit import orbit_position
 from mjspace.errors import NoRendererError
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log

@@ -10,7 +10,8 @@ from pydantic import ValidationError
 from mjspace.actuators.motor_drives import DriveTables
 from mjspace.actuators.pmsm import Pmsm
 from mjspace.actuators.reaction_wheels import Wheels
-from mjspace.scenario.equipment import Driven, type_of
+from mjspace.scenario.declared import type_of
+from mjspace.scenario.equipment import Driven
 from mjspace.scenario.plant import PlantTable
 from mjspace.scenario.scenario import Scenario
 

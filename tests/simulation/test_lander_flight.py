@@ -12,11 +12,11 @@ from mjspace.controllers.landing.descent import SineDescent
 
 from mjspace import attitude, run
 from mjspace.contract import Array, Measurement, Trajectory
-from mjspace.environment import install
+from mjspace.environment.gravity import CentralGravity
+from mjspace.environment.install import install_callbacks, userdata, userdata_size
 from mjspace.errors import InputError
 from mjspace.runner.replay import verify
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.landing import CentralGravity
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
@@ -66,12 +66,12 @@ RIGID = """<mujoco><option timestep="0.002" integrator="RK4" gravity="0 0 0">
 @pytest.mark.slow
 def test_a_rigid_lander_flies_as_the_oracle_says() -> None:
     outside = Environment(gravity=CentralGravity(gm=GM, radius=RADIUS))
-    install.install()
+    install_callbacks()
     spec = mujoco.MjSpec.from_string(RIGID)
-    spec.nuserdata = install.userdata_size(outside, {})
+    spec.nuserdata = userdata_size(outside)
     model = spec.compile()
     data = mujoco.MjData(model)
-    data.userdata[:] = install.userdata(model, outside, {})
+    data.userdata[:] = userdata(model, outside)
     law, reference, duration, period = LANDS_BEHIND_LAGS, SineDescent(), 200.0, 0.02
     wanted = fly_oracle(law, reference, duration=duration)
     data.qpos[:3], data.qvel[:3] = (
@@ -203,7 +203,7 @@ def test_the_ground_gives_no_energy_back_and_carries_the_weight() -> None:
     assert gained.max() < 2e-2  # J; 7e-3 measured: the gimbals' servos are not passive
     model = assembly.vehicle.model
     data = mujoco.MjData(model)
-    install.install()
+    install_callbacks()
     mujoco.mj_setState(model, data, physics[-1], mujoco.mjtState.mjSTATE_INTEGRATION)
     mujoco.mj_forward(model, data)
     weight = 100.0 * GM / RADIUS**2

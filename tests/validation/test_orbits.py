@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from mjspace.contract import Array
-from mjspace.scenario.environment import Orbit
+from mjspace.environment.orbit import Orbit
 from mjspace.validation.benchmarks.orbits import (
     BESIDE,
     BODY,

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from mjspace.contract import Array
-from mjspace.scenario.environment import Environment, Orbit
+from mjspace.environment.orbit import Orbit
+from mjspace.scenario.environment import Environment
 from mjspace.validation import meter, stand
 from mjspace.validation.benchmark import Conditions
 

@@ -14,7 +14,6 @@ from mjspace.errors import InputError
 from mjspace.log.reader import Log
 from mjspace.runner.replay import verify
 from mjspace.runner.run import run
-from mjspace.scenario.deployments import Deployment
 from mjspace.scenario.loading import load
 from mjspace.scenario.plant import Part, PlantTable, Rates
 from mjspace.simulation.assembly import assemble
@@ -22,7 +21,7 @@ from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
 from mjspace.vehicle import indices
 from mjspace.vehicle import vehicle as plant
-from mjspace.vehicle.deployments import Boom
+from mjspace.vehicle.deployments import Boom, Deployment
 
 RATE = 2.0 * np.pi / 5600.0  # rad/s, of the orbit
 REDUCED = 2.0 * 100.0 / 102.0  # kg, of the tip against the bus

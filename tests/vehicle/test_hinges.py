@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mjspace.contract import Array
-from mjspace.environment import install
+from mjspace.environment.install import install_callbacks
 from mjspace.errors import InputError
 from mjspace.scenario.hinges import Hinge
 from mjspace.scenario.loading import load
@@ -33,7 +33,7 @@ def coasting(assembly: Assembly, seconds: float) -> Any:
 
 
 def at_start(assembly: Assembly) -> Any:
-    install.install()
+    install_callbacks()
     data = mujoco.MjData(assembly.vehicle.model)
     data.qpos[:], data.qvel[:] = assembly.qpos, assembly.qvel
     data.userdata[:] = assembly.userdata

@@ -9,8 +9,7 @@ from scipy.integrate import simpson, solve_ivp
 from mjspace import attitude
 from mjspace.constants import GM
 from mjspace.contract import Array
-from mjspace.environment import kepler
-from mjspace.scenario.environment import Orbit
+from mjspace.environment.orbit import Orbit
 from mjspace.validation import stand
 from mjspace.validation.benchmark import (
     Benchmark,
@@ -101,7 +100,7 @@ def exact_tumble(time: Array) -> Array:
 def fly(conditions: Conditions) -> Readings:
     """Detumble a ball over six orbits, and a body in a constant field within a minute."""
     sign = -1.0 if conditions.fault == "sign" else 1.0
-    orbit = kepler.pack(Orbit(semi_major_axis=RADIUS, inclination=0.5 * np.pi))
+    orbit = Orbit(semi_major_axis=RADIUS, inclination=0.5 * np.pi).elements()
 
     def ball(spec: Any) -> None:
         spec.body("bus").inertia = np.full(3, BALL)

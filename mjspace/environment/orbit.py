@@ -1,0 +1,120 @@
+"""A Kepler orbit whose free-fall frame the vehicle flies in: what is left of gravity there."""
+
+import math
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field, model_validator
+
+from mjspace.constants import GM, RADIUS
+from mjspace.contract import Array
+from mjspace.environment import kepler
+from mjspace.environment.base import Term
+from mjspace.environment.bodies import Bodies, add_wrench
+from mjspace.environment.compiled import compiled
+from mjspace.environment.gravity import gradient_torque
+from mjspace.scenario.environment import Environment
+from mjspace.scenario.fields import Finite, Positive, Si, WithinTurn
+
+
+@compiled
+def tidal(orbit: Any, time: float, bodies: Bodies) -> None:
+    """Add the planet's gravity less that at the frame's origin, which falls along ``orbit``.
+
+    Every body feels it at its own centre of mass, and 3 GM/r^3 u x I u, the gravity-gradient torque
+    of its own inertia there, u the unit vector from the planet (Wertz 1978, Spacecraft Attitude
+    Determination and Control, section 17.2.1). The difference is Encke's, without cancellation
+    (Battin 1999, Mathematics and Methods of Astrodynamics, chapter 8).
+    """
+    rx, ry, rz = kepler.position(orbit, time)
+    radius2 = rx * rx + ry * ry + rz * rz
+    rate2 = orbit[0] / (radius2 * math.sqrt(radius2))
+    for body in range(1, bodies.body_mass.size):
+        mass = bodies.body_mass[body]
+        if mass == 0.0:
+            continue
+        dx, dy, dz = bodies.xipos[body]
+        x, y, z = rx + dx, ry + dy, rz + dz
+        # |R + d|^2 = (1 + q) |R|^2;  shrink = (1 + q)^(-3/2) - 1
+        q = (dx * (dx + 2.0 * rx) + dy * (dy + 2.0 * ry) + dz * (dz + 2.0 * rz)) / radius2
+        ratio3 = (1.0 + q) * math.sqrt(1.0 + q)
+        shrink = -q * (3.0 + q * (3.0 + q)) / (ratio3 * (1.0 + ratio3))
+        scale = -mass * rate2
+        force = (scale * (dx + shrink * x), scale * (dy + shrink * y), scale * (dz + shrink * z))
+        factor = 3.0 * rate2 / (ratio3 * (1.0 + q) * radius2)
+        add_wrench(bodies, body, force, gradient_torque(bodies, body, x, y, z, factor))
+
+
+class Orbit(Term):
+    """A Kepler orbit: its gravity gradient acts on every body, in the free-fall frame."""
+
+    kernels: ClassVar = {1: tidal}
+
+    body: Literal["earth", "moon"] = "earth"
+    """What is orbited."""
+    semi_major_axis: Annotated[Positive, Si("m")]
+    """From the body's centre."""
+    eccentricity: Annotated[Finite, Field(ge=0, lt=1)] = 0.0
+    """0 is a circle."""
+    inclination: Annotated[Finite, Field(ge=0, le=math.pi), Si("rad")] = 0.0
+    """To the inertial x-y plane; above 90 deg the orbit is retrograde."""
+    ascending_node: WithinTurn = 0.0
+    """Right ascension of the ascending node."""
+    periapsis: WithinTurn = 0.0
+    """Argument of periapsis."""
+    true_anomaly: WithinTurn = 0.0
+    """At time zero."""
+
+    @model_validator(mode="after")
+    def _above_the_planet(self) -> Self:
+        lowest, radius = self.semi_major_axis * (1.0 - self.eccentricity), RADIUS[self.body]
+        if lowest <= radius:
+            meant = f": did you mean '{self.semi_major_axis:.10g} km'?"
+            raise ValueError(
+                f"semi_major_axis: got {self.semi_major_axis:.10g} m, with which the periapsis, "
+                f"{lowest:.6g} m from the centre, is inside the {self.body}, whose radius is "
+                f"{radius:.6g} m{meant if radius < 1e3 * lowest < 100.0 * radius else ''}"
+            )
+        return self
+
+    def payload_size(self) -> int:
+        """Return the size of ``elements``."""
+        return 10
+
+    def pack(self, model: Any, environment: Environment) -> Array:
+        """Return ``elements``."""
+        return self.elements()
+
+    def elements(self) -> Array:
+        """Return what ``kepler.position`` and ``kepler.velocity`` read, ten numbers.
+
+        GM [m^3/s^2], mean motion [rad/s], mean anomaly at time zero [rad], eccentricity, then the
+        two semi-axes as vectors [m], towards the periapsis and along the motion there.
+        """
+        a, e = self.semi_major_axis, self.eccentricity
+        gm = GM[self.body]
+        half = math.atan2(
+            math.sqrt(1.0 - e) * math.sin(0.5 * self.true_anomaly),
+            math.sqrt(1.0 + e) * math.cos(0.5 * self.true_anomaly),
+        )
+        mean_anomaly = 2.0 * half - e * math.sin(2.0 * half)
+        # columns: towards the ascending node and 90 deg ahead of it in the orbit
+        node, tilt = self.ascending_node, self.inclination
+        ahead = [-math.sin(node) * math.cos(tilt), math.cos(node) * math.cos(tilt), math.sin(tilt)]
+        plane = np.column_stack([[math.cos(node), math.sin(node), 0.0], ahead])
+        cosine, sine = math.cos(self.periapsis), math.sin(self.periapsis)
+        major = a * plane @ [cosine, sine]
+        minor = a * math.sqrt(1.0 - e * e) * plane @ [-sine, cosine]
+        return np.array([gm, math.sqrt(gm / a**3), mean_anomaly, e, *major, *minor])
+
+
+def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
+    """Return the position of the frame's origin from the planet's centre, inertial axes [m].
+
+    ``time`` [s] of shape (...) gives positions of shape (..., 3).
+    """
+    times = np.asarray(time, dtype=np.float64)
+    elements = orbit.elements()
+    positions = [kepler.position(elements, instant) for instant in times.ravel()]
+    return np.reshape(positions, (*times.shape, 3))
