@@ -177,7 +177,7 @@ class Reference(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """A ``Reference`` that says where the vehicle shall be as well."""
+    """A ``Reference`` with the desired position of the vehicle as well."""
 
     attitude: Array
     """Quaternion, scalar first, desired body axes to inertial, shape (..., 4)."""
@@ -194,7 +194,7 @@ class Trajectory(NamedTuple):
 
 
 DesiredMotion = Reference | Trajectory
-"""What a law is told to follow."""
+"""What a law is to follow."""
 
 
 class Event(NamedTuple):
@@ -210,14 +210,14 @@ class Event(NamedTuple):
 
 
 class TorqueCommand(NamedTuple):
-    """What a law asks of the reaction wheels."""
+    """A law's command to the reaction wheels."""
 
     torque: Annotated[Array, Unit("N m")]
     """On the bus, body axes [N m], shape (..., 3)."""
 
 
 class VoltageCommand(NamedTuple):
-    """What an inner loop asks of the motors' inverters."""
+    """An inner loop's command to the motors' inverters."""
 
     voltage: Annotated[Array, Unit("V")]
     """(u_d, u_q) of each motor, in the rotor's axes [V], shape (..., m, 2); in the stator's, the
@@ -225,14 +225,14 @@ class VoltageCommand(NamedTuple):
 
 
 class GimbalRateCommand(NamedTuple):
-    """What a law asks of gimbals that have speed loops of their own."""
+    """A law's command to gimbals that have speed loops of their own."""
 
     gimbal_rate: Annotated[Array, Unit("rad/s")]
     """Relative to what carries each [rad/s], shape (..., g)."""
 
 
 class ThrustCommand(NamedTuple):
-    """What a law asks of an engine on two gimbals."""
+    """A law's command to an engine on two gimbals."""
 
     thrust: Annotated[Array, Unit("N")]
     """[N], shape (..., 1)."""
@@ -241,7 +241,7 @@ class ThrustCommand(NamedTuple):
 
 
 class PulseCommand(NamedTuple):
-    """What a law asks of on/off thrusters."""
+    """A law's command to on/off thrusters."""
 
     on_time: Annotated[Array, Unit("s")]
     """For how long each is on, from the beginning of the control period [s], shape (..., n); of the
@@ -253,11 +253,12 @@ class Law(Protocol):
 
     ``state``, ``command`` and ``signals`` are named tuples of float64 arrays whose leading axes are
     those of the measurement; they are logged under their field names, so their shapes never change
-    during a flight. A law that says ``batched = True`` handles any leading axes; another sees the
-    arrays of one vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any
-    command with that field; motors with an electrical side a ``VoltageCommand``; gimbals with speed
-    loops a ``GimbalRateCommand``; an engine on gimbals a ``ThrustCommand``, on/off thrusters a
-    ``PulseCommand``. ``reference`` is what the scenario's reference says: ``DesiredMotion``.
+    during a flight. A field declares its unit in its annotation, ``Annotated[Array, Unit("rad")]``.
+    A law that says ``batched = True`` handles any leading axes; another sees the arrays of one
+    vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any command with
+    that field; motors with an electrical side a ``VoltageCommand``; gimbals with speed loops a
+    ``GimbalRateCommand``; an engine on gimbals a ``ThrustCommand``, on/off thrusters a
+    ``PulseCommand``. ``reference`` is a row of the scenario's reference: ``DesiredMotion``.
 
     A batched law may have an inner loop as well, for what must be quick: a method
     ``inner(state, time, command, measurement) -> (state, command)``, pure like ``step``, that is
@@ -274,13 +275,13 @@ class Law(Protocol):
 
 
 class ReferenceSource(Protocol):
-    """A wanted motion as a pure function of time."""
+    """A desired motion as a pure function of time."""
 
     def at(self, time: Array) -> DesiredMotion:
         """Return the reference at each ``time`` [s], shape (n,), as arrays with n rows.
 
-        Any named tuple would do that begins with the fields of ``Reference``: the law is given what
-        it says, and the log shows it.
+        Any named tuple is valid that begins with the fields of ``Reference``: the law receives its
+        rows, and the log has its fields.
         """
 
 

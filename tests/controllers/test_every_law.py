@@ -82,11 +82,12 @@ def inputs(kind: str) -> tuple[Any, float, list[tuple[Measurement, Reference]]]:
     spin = 1e-3 * draw.normal(size=(COUNT, 3))
     turn = att.from_rotation_vector(0.02 * draw.normal(size=(COUNT, 3)))
     found = []
-    for row, (seen, wanted) in enumerate(watched.inputs[:2]):
-        changed = seen._replace(
-            attitude=att.multiply(seen.attitude, turn), rate=seen.rate + (1.0 + 0.1 * row) * spin
+    for row, (measured, desired) in enumerate(watched.inputs[:2]):
+        changed = measured._replace(
+            attitude=att.multiply(measured.attitude, turn),
+            rate=measured.rate + (1.0 + 0.1 * row) * spin,
         )
-        found.append((frozen(changed), frozen(wanted)))
+        found.append((frozen(changed), frozen(desired)))
     return assembly.law, period, found
 
 
@@ -117,11 +118,11 @@ def outcome(law: Any, period: float, instants: Any) -> tuple[Any, ...]:
     """Return what the law returns at reset, at each instant, and from its inner loop."""
     state = law.reset(*instants[0])
     found = [state]
-    for number, (seen, wanted) in enumerate(instants):
-        state, command, signals = law.step(state, number * period, seen, wanted)
+    for number, (measured, desired) in enumerate(instants):
+        state, command, signals = law.step(state, number * period, measured, desired)
         found += [state, command, signals]
         if hasattr(law, "inner"):
-            state, inner = law.inner(state, number * period, command, seen)
+            state, inner = law.inner(state, number * period, command, measured)
             found += [state, inner]
     return tuple(found)
 
@@ -144,13 +145,13 @@ def repeats(law: Any, period: float, instants: Any) -> None:
 def keeps_memory(law: Any, period: float, instants: Any) -> None:
     """A step and an inner step leave the state that they receive as it was."""
     state = law.reset(*instants[0])
-    for number, (seen, desired) in enumerate(instants):
+    for number, (measured, desired) in enumerate(instants):
         before = [leaf.copy() for leaf in leaves(state)]
-        after, command, _ = law.step(state, number * period, seen, desired)
+        after, command, _ = law.step(state, number * period, measured, desired)
         assert all(map(np.array_equal, before, leaves(state)))
         if hasattr(law, "inner"):
             before = [leaf.copy() for leaf in leaves(after)]
-            inner_after, _ = law.inner(after, number * period, command, seen)
+            inner_after, _ = law.inner(after, number * period, command, measured)
             assert all(map(np.array_equal, before, leaves(after)))
             after = inner_after
         state = after
@@ -173,11 +174,11 @@ def shares_nothing(law: Any, period: float, instants: Any) -> None:
 def is_finite(law: Any, period: float, instants: Any) -> None:
     """The state and the commands are finite; a law may well signal infinity."""
     state = law.reset(*instants[0])
-    for number, (seen, desired) in enumerate(instants):
-        state, command, _ = law.step(state, number * period, seen, desired)
+    for number, (measured, desired) in enumerate(instants):
+        state, command, _ = law.step(state, number * period, measured, desired)
         assert all(np.isfinite(leaf).all() for leaf in leaves((state, command)))
         if hasattr(law, "inner"):
-            state, command = law.inner(state, number * period, command, seen)
+            state, command = law.inner(state, number * period, command, measured)
             assert all(np.isfinite(leaf).all() for leaf in leaves((state, command)))
 
 
@@ -186,7 +187,7 @@ def is_batched(law: Any, period: float, instants: Any) -> None:
     batch = leaves(outcome(law, period, instants))
     for index in range(COUNT):
         part = slice(index, index + 1)
-        lone = [(seen._map(itemgetter(part)), desired) for seen, desired in instants]
+        lone = [(measured._map(itemgetter(part)), desired) for measured, desired in instants]
         for one, many in zip(leaves(outcome(law, period, lone)), batch, strict=True):
             assert np.array_equal(one, many[part] if many.size else many, equal_nan=True)
 
@@ -194,7 +195,10 @@ def is_batched(law: Any, period: float, instants: Any) -> None:
 def flipped(instants: Any) -> Any:
     """Return the instants with the sign of some of the vehicles' measured quaternions changed."""
     signs = np.array([[-1.0], [1.0], [-1.0], [1.0]])
-    return [(seen._replace(attitude=signs * seen.attitude), desired) for seen, desired in instants]
+    return [
+        (measured._replace(attitude=signs * measured.attitude), desired)
+        for measured, desired in instants
+    ]
 
 
 def takes_either_sign(law: Any, period: float, instants: Any) -> None:
