@@ -56,7 +56,8 @@ def test_dry_friction_is_judged_but_for_order_and_step(tmp_path: Path) -> None:
     assert found.rows[2].reason == "friction can only dissipate energy"
     assert found.rows[3].measured == pytest.approx(4.0, abs=0.1)
     assert found.unjudged == [
-        "order and step with dry friction: discontinuous forces have no order; both are judged without"
+        "order and step with dry friction: discontinuous forces have no order; "
+        "both are judged without"
     ]
     assert "keeps the attitude within" in found.advice[-1]
 
