@@ -81,8 +81,6 @@ class AdaptiveSignals(NamedTuple):
 class _Contraction(Gains):
     """Gains of every law of this module."""
 
-    batched: ClassVar[bool] = True
-
     rate_gain: float = gain("N m s/rad", default=25.0, above=0.0)
     """Kc, the same on each axis."""
     attitude_gain: float = gain("1/s", default=25.0, above=0.0)
@@ -98,6 +96,8 @@ class Ideal(_Contraction):
     The printed h = R^T hI needs a constant momentum. Here p = H w + sum a Jw (a.w + Omega) from the
     tachometers, which is equal on a torque-free vehicle and valid under any torque.
     """
+
+    batched: ClassVar[bool] = True
 
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
@@ -134,6 +134,8 @@ class Gradient(_Contraction):
     period.
     """
 
+    batched: ClassVar[bool] = True
+
     control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
     adaptation_gain: float = gain(default=1.0, above=0.0)
@@ -168,6 +170,8 @@ class Adaptive(_Contraction):
     largest |q - qd| is 2.33e-2, against 2.32e-2 in continuous time. The filter uses the limited
     torque, so ``torque_limit`` must not exceed that of the actuators.
     """
+
+    batched: ClassVar[bool] = True
 
     control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""

@@ -118,8 +118,6 @@ class Classical(Gains):
 class _ModifiedGains(Gains):
     """What the modified and the robust law share."""
 
-    batched: ClassVar[bool] = True
-
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """M: of the rigid bus, about its centre of mass, body axes."""
     attitude_gain: float = gain("1/s", default=1.0, above=0.0)
@@ -138,6 +136,8 @@ class Modified(_ModifiedGains):
 
     wr = wb - 2 lam sigma_e and s = w - wr: both errors vanish exponentially (Lemma 3.1.1).
     """
+
+    batched: ClassVar[bool] = True
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
@@ -164,6 +164,8 @@ class Robust(_ModifiedGains):
     period is above twice the inertia over that slope, 1.3 ms there. The errors' ultimate bound is
     2.63 times the ball printed in Corollary 3.2.1 (E25).
     """
+
+    batched: ClassVar[bool] = True
 
     disturbance_bound: float = gain("N m", default=0.04, above=0.0)
     """tbar: largest norm of the disturbance; the thesis' reaches 0.0387 (E24)."""
