@@ -34,7 +34,7 @@ class Deployment(Table):
 
 @dataclass(frozen=True)
 class Boom:
-    """A boom's drive: its position loop is told where the tip shall be."""
+    """A boom's drive: its position loop is commanded where the tip is to be."""
 
     name: str
     table: Deployment
@@ -43,7 +43,7 @@ class Boom:
     motor: int
     """In ``ctrl``."""
     lead: float
-    """By which the loop's command leads the wanted place, for it not to lag [s]."""
+    """By which the loop's command leads the desired place, against its lag [s]."""
 
     @classmethod
     def of(cls, model: Any, qpos: Array, name: str, table: Deployment) -> Self:
@@ -58,11 +58,11 @@ class Boom:
 
     @property
     def end(self) -> float:
-        """When the tip is told to rest [s]."""
+        """When the desired tip comes to rest [s]."""
         return self.table.at + abs(self._way) / (self.table.rate or 1.0) + self.table.ramp
 
-    def wanted(self, time: float) -> tuple[float, float]:
-        """Return where the tip shall be [m], and how fast [m/s]."""
+    def desired(self, time: float) -> tuple[float, float]:
+        """Return where the tip is to be [m], and how fast [m/s]."""
         since = time - self.table.at
         cruise = self.end - self.table.ramp - self.table.at
         rate = np.copysign(self.table.rate or 0.0, self._way)
@@ -127,7 +127,7 @@ class Deployments:
         """Act for the step that begins at ``now`` [s] and return what happens."""
         events: list[Event] = []
         for boom in self._booms:
-            place, rate = boom.wanted(now + 0.5 * self._step)
+            place, rate = boom.desired(now + 0.5 * self._step)
             self._ctrl[:, boom.motor] = place + boom.lead * rate
             for moment, what in ((boom.table.at, "sets out"), (boom.end, "is out")):
                 if now - TICK <= moment < now + self._step - TICK:

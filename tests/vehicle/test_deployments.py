@@ -33,10 +33,10 @@ def profile(at: float = 10.0, length: float = 6.0, ramp: float = 10.0) -> Boom:
 
 
 @pytest.mark.parametrize(("length", "ramp"), [(6.0, 10.0), (6.0, 0.0), (0.3, 10.0), (0.3, 1.0)])
-def test_a_boom_is_told_to_go_where_it_shall_and_no_faster(length: float, ramp: float) -> None:
+def test_a_boom_is_commanded_to_its_end_and_no_faster(length: float, ramp: float) -> None:
     boom = profile(length=length, ramp=ramp)
     times = np.linspace(0.0, boom.end + 10.0, 4_001)
-    place, rate = np.array([boom.wanted(time) for time in times]).T
+    place, rate = np.array([boom.desired(time) for time in times]).T
     assert place[0] == 0.5
     assert place[-1] == pytest.approx(length, abs=1e-12)
     assert np.abs(rate).max() <= 0.05 + 1e-12
@@ -54,7 +54,7 @@ def test_a_boom_in_orbit_swings_as_its_growing_inertia_says(tmp_path: Path) -> N
 
     # (I (n + pitch'))' = -3/2 n^2 (Ir - Iy) sin 2 pitch, the tip where its drive is told to be
     def slope(time: float, state: Array) -> list[float]:
-        far = REDUCED * boom.wanted(time)[0] ** 2
+        far = REDUCED * boom.desired(time)[0] ** 2
         torque = -1.5 * RATE**2 * (10.01 + far - 8.01) * np.sin(2.0 * state[0])
         return [state[1] / (12.01 + far) - RATE, torque]
 
