@@ -27,7 +27,7 @@ _RK4, _OTHERS = 0.72 * 2.785, 0.5 * 2.0
 """Slope times step over inertia: of what the integrator damps at all, that part which leaves room
 for an inertia that changes with the configuration and, with Euler, does not overshoot."""
 _LEAST = 0.1
-"""The same where viscous friction leaves no room."""
+"""The least that is left where viscous friction leaves no room."""
 
 
 @compiled

@@ -1,6 +1,6 @@
-"""Arrays over C memory, for native callbacks that are given MuJoCo's structs as pointers.
+"""Arrays over C memory, for native callbacks that get MuJoCo's structs as pointers.
 
-A struct is read as an array of 8-byte words; ``mjspace.struct_offsets`` says which word is which.
+A struct is read as an array of 8-byte words; ``struct_offsets`` says which word is which.
 """
 
 from typing import Any

@@ -98,7 +98,7 @@ def find() -> tuple[ModelOffsets, DataOffsets]:
 
 
 def verify(struct: Any, offsets: ModelOffsets | DataOffsets, size: int) -> None:
-    """Compare what lies at ``offsets`` [words] in ``struct`` with what the Python binding shows.
+    """Compare what lies at ``offsets`` [words] in ``struct`` with what the Python binding reports.
 
     ``struct`` is an MjModel or MjData of ``size`` bytes. Fields are read in rising order and none
     beyond the first mismatch, so that a wrong layout is reported, not walked off.

@@ -158,9 +158,9 @@ def test_a_torque_below_breakaway_creeps_and_one_above_runs_away() -> None:
         assert (data.qvel[6] > 1.0) if runs else (data.qvel[6] < 0.11)
 
 
-def test_a_step_that_hides_the_breakaway_is_told() -> None:
-    told = r"'wheel_0': a step of 1 s .* too wide for a stribeck_speed of 0.5 rad/s: under 93 %"
-    with pytest.warns(ModelWarning, match=told) as caught:
+def test_a_step_that_hides_the_breakaway_is_warned_of() -> None:
+    message = r"'wheel_0': a step of 1 s .* too wide for a stribeck_speed of 0.5 rad/s: under 93 %"
+    with pytest.warns(ModelWarning, match=message) as caught:
         spun(Friction(0.2, 0.5, 0.5), [0.0], step=1.0)
     step = float(str(caught[0].message).split("below ")[1].removesuffix(" s"))
     assert step == pytest.approx(0.2, rel=0.05)

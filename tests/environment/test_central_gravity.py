@@ -15,7 +15,7 @@ from mjspace.environment.install import install_callbacks, userdata, userdata_si
 from mjspace.scenario.environment import Environment
 
 PAPER = CentralGravity(gm=4.902e12, radius=1738e3)
-SMALL = CentralGravity(gm=4.0e3, radius=50.0)  # an asteroid, where the gradient can be seen
+SMALL = CentralGravity(gm=4.0e3, radius=50.0)  # an asteroid, with a large gradient
 INERTIA = np.array([[12.0, 0.7, -0.4], [0.7, 14.0, 1.1], [-0.4, 1.1, 5.0]])
 BODY = """<mujoco><option integrator="RK4" gravity="0 0 0">
   <flag contact="disable" constraint="disable" autoreset="disable"/></option>
@@ -72,12 +72,12 @@ def test_a_tumbling_body_falls_as_newton_says(
     data.qpos[:] = 30.0, -20.0, 40.0, 0.8, -0.2, 0.4, 0.4
     data.qvel[:] = *velocity, 0.03, -0.1, 0.06
     start = np.concatenate([data.qpos[:3], data.qvel[:3], data.qpos[3:], data.qvel[3:]])
-    wanted = fall(gravity, start, duration)
+    expected = fall(gravity, start, duration)
     mujoco.mj_step(model, data, round(duration / step))
     np.testing.assert_allclose(
-        data.qpos[:3], wanted[:3], rtol=0.0, atol=2e-8
+        data.qpos[:3], expected[:3], rtol=0.0, atol=2e-8
     )  # m; 5e-12 and 2e-11 measured, of 2000 km
-    turned = attitude.rotation_angle(data.qpos[3:], attitude.normalize(wanted[6:10]))
+    turned = attitude.rotation_angle(data.qpos[3:], attitude.normalize(expected[6:10]))
     assert turned < 1e-9  # rad; 8e-11 and 7e-13 measured
 
 

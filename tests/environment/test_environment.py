@@ -80,7 +80,7 @@ def compiled(
     plant: PlantTable | None = None,
     step: float = 1.0,
 ) -> tuple[Any, Any]:
-    """Return the model of ``xml`` and its data, whose userdata asks for this environment."""
+    """Return the model of ``xml`` and its data, whose userdata holds this environment."""
     spec = mujoco.MjSpec.from_string(xml)
     spec.option.timestep = step
     spec.nuserdata = userdata_size(outside, plant)
@@ -151,16 +151,16 @@ def flown(orbit: Orbit, rate: Array, duration: float, step: float) -> Array:
 @pytest.mark.parametrize("orbit", [CIRCULAR, ELLIPTIC], ids=["circular", "elliptic"])
 def test_three_axis_libration(orbit: Orbit) -> None:
     rate = RATE * np.array([0.3, -1.2, 0.5])
-    wanted = libration(orbit, rate, 6000.0)
+    expected = libration(orbit, rate, 6000.0)
     # RK4 of motion at no more than 3 n: 3 n t (3 n h)^4 / 120 = 7e-10 rad; measured 3e-12 and 2e-12
-    assert angle_between(flown(orbit, rate, 6000.0, 2.5), wanted) < 5e-11
+    assert angle_between(flown(orbit, rate, 6000.0, 2.5), expected) < 5e-11
 
 
 def test_fourth_order_in_the_step() -> None:
     rate = RATE * np.array([0.3, -1.2, 0.5])
-    wanted = libration(ELLIPTIC, rate, 6400.0)
+    expected = libration(ELLIPTIC, rate, 6400.0)
     steps = np.array([80.0, 40.0, 20.0])
-    errors = [angle_between(flown(ELLIPTIC, rate, 6400.0, step), wanted) for step in steps]
+    errors = [angle_between(flown(ELLIPTIC, rate, 6400.0, step), expected) for step in steps]
     orders = -np.diff(np.log2(errors))
     # a torque held over the step, or evaluated at the wrong stage time, gives 1
     assert np.all(np.abs(orders - 4.0) < 0.1), orders
@@ -204,10 +204,10 @@ def test_gradient_torque_of_one_body(orbit: Orbit) -> None:
     mujoco.mj_forward(model, data)
     place = orbit_position(orbit, 700.0)
     up = axes(TUMBLING).T @ place / np.linalg.norm(place)
-    wanted = 3.0 * GM[orbit.body] / np.linalg.norm(place) ** 3 * np.cross(up, INERTIA @ up)
+    expected = 3.0 * GM[orbit.body] / np.linalg.norm(place) ** 3 * np.cross(up, INERTIA @ up)
     np.testing.assert_array_equal(data.qfrc_passive[:3], 0.0)
     # rounding of some hundred operations, MuJoCo's principal axes among them; measured 7e-15
-    np.testing.assert_allclose(data.qfrc_passive[3:], wanted, rtol=1e-13)
+    np.testing.assert_allclose(data.qfrc_passive[3:], expected, rtol=1e-13)
 
 
 def test_dumbbell_feels_what_a_body_of_its_inertia_feels() -> None:
@@ -222,11 +222,11 @@ def test_dumbbell_feels_what_a_body_of_its_inertia_feels() -> None:
     arm = np.array([0.8, 0.0, 0.6])
     inertia = 20.0 * (np.eye(3) - np.outer(arm, arm))
     up = axes(TUMBLING).T @ [1.0, 0.0, 0.0]
-    wanted = 3.0 * RATE**2 * np.cross(up, inertia @ up)
+    expected = 3.0 * RATE**2 * np.cross(up, inertia @ up)
     # what is left out is of order (1 m / 7e6 m)^2 = 2e-14
-    np.testing.assert_allclose(data.qfrc_passive[3:6], wanted, rtol=1e-12)
+    np.testing.assert_allclose(data.qfrc_passive[3:6], expected, rtol=1e-12)
     # each half is pulled on its own: the hinge carries half of the torque about its axis, to 1e-7
-    assert data.qfrc_passive[6] == pytest.approx(wanted[1] / 2, rel=1e-6)
+    assert data.qfrc_passive[6] == pytest.approx(expected[1] / 2, rel=1e-6)
     # and the net force is of second order, 1e-7 of the tidal force on one half
     assert np.abs(data.qfrc_passive[:3]).max() < 1e-6 * 10 * RATE**2
 
@@ -238,7 +238,7 @@ def test_every_dof_takes_its_share() -> None:
     data.time = 40.0
     mujoco.mj_forward(model, data)
     origin = orbit_position(ELLIPTIC, 40.0)
-    wanted = np.zeros(model.nv)
+    expected = np.zeros(model.nv)
     for body in range(1, model.nbody):
         translation, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
         mujoco.mj_jacBodyCom(model, data, translation, rotation, body)
@@ -248,19 +248,19 @@ def test_every_dof_takes_its_share() -> None:
         inertia = principal * model.body_inertia[body] @ principal.T
         factor = 3.0 * GM["moon"] / np.linalg.norm(place) ** 5
         torque = factor * np.cross(place, inertia @ place)
-        wanted += translation.T @ (model.body_mass[body] * gravity) + rotation.T @ torque
+        expected += translation.T @ (model.body_mass[body] * gravity) + rotation.T @ torque
     # the reference cancels: 0.6 m/s^2 at 1e-16, times some 70 kg and arms of up to 1 km
-    np.testing.assert_allclose(data.qfrc_passive, wanted, rtol=0, atol=3e-11)
-    assert np.abs(wanted).min() > 1e-6  # no dof is left alone
+    np.testing.assert_allclose(data.qfrc_passive, expected, rtol=0, atol=3e-11)
+    assert np.abs(expected).min() > 1e-6  # no dof is left alone
 
 
 def test_small_offsets_do_not_cancel() -> None:
     model, data = compiled(BODY, Environment(orbit=CIRCULAR))
     data.qpos[:3] = offset = np.array([2.0, -3.0, 5.0]) * 1e-4
     mujoco.mj_forward(model, data)
-    wanted = -50.0 * RATE**2 * (offset - 3.0 * np.array([offset[0], 0.0, 0.0]))
+    expected = -50.0 * RATE**2 * (offset - 3.0 * np.array([offset[0], 0.0, 0.0]))
     # the next order is 3/2 d/R = 1e-10; the difference of two accelerations is good to 1e-6 only
-    np.testing.assert_allclose(data.qfrc_passive[:3], wanted, rtol=1e-9)
+    np.testing.assert_allclose(data.qfrc_passive[:3], expected, rtol=1e-9)
 
 
 def test_free_fall_beside_the_reference_is_another_kepler_orbit() -> None:
@@ -269,10 +269,10 @@ def test_free_fall_beside_the_reference_is_another_kepler_orbit() -> None:
     data.qpos[:3] = orbit_position(other, 0.0) - orbit_position(ELLIPTIC, 0.0)
     data.qvel[:3] = velocity_at(other, 0.0) - velocity_at(ELLIPTIC, 0.0)
     mujoco.mj_step(model, data, 7000)
-    wanted = orbit_position(other, 14e3) - orbit_position(ELLIPTIC, 14e3)
-    assert np.linalg.norm(wanted) > 1e4
+    expected = orbit_position(other, 14e3) - orbit_position(ELLIPTIC, 14e3)
+    assert np.linalg.norm(expected) > 1e4
     # velocities good to 1e-10 m/s grow to some 3e-6 m over two orbits; measured 1e-6
-    assert np.linalg.norm(data.qpos[:3] - wanted) < 1e-5
+    assert np.linalg.norm(data.qpos[:3] - expected) < 1e-5
 
 
 SINES = [
@@ -327,8 +327,8 @@ def test_frames_and_several_torques_add_up() -> None:
     model, data = compiled(BODY, Environment(torques=[body, inertial, body]), step=0.01)
     data.qpos[3:7], data.time = TUMBLING, 1.23
     mujoco.mj_forward(model, data)
-    wanted = np.asarray(2.0 * torque_at(1.23)) + axes(TUMBLING).T @ np.array([0.5, 0.1, -0.2])
-    np.testing.assert_allclose(data.qfrc_passive[3:], wanted, atol=1e-15)  # 1 ulp of 1
+    expected = np.asarray(2.0 * torque_at(1.23)) + axes(TUMBLING).T @ np.array([0.5, 0.1, -0.2])
+    np.testing.assert_allclose(data.qfrc_passive[3:], expected, atol=1e-15)  # 1 ulp of 1
     np.testing.assert_array_equal(data.qfrc_passive[:3], 0.0)
 
 
@@ -356,9 +356,9 @@ def test_coulomb_friction_stops_the_wheel_and_leaves_the_momentum() -> None:
         mujoco.mj_step(model, data, round(duration / 0.002))
         decay = coefficient * (1 / rotor + 1 / bus) * data.time
         # c tanh(s / v) on a reduced inertia: sinh(s / v) falls exponentially
-        wanted = 0.1 * np.arcsinh(np.sinh(start / 0.1) * np.exp(-decay / 0.1))
+        expected = 0.1 * np.arcsinh(np.sinh(start / 0.1) * np.exp(-decay / 0.1))
         # RK4: rate 0.4 /s, (0.4 h)^4 / 120 is nothing; rounding over 10,000 steps
-        assert data.qvel[6] == pytest.approx(wanted, abs=1e-12)
+        assert data.qvel[6] == pytest.approx(expected, abs=1e-12)
         # the bus takes what the wheel gives
         assert bus * data.qvel[5] + rotor * (data.qvel[5] + data.qvel[6]) == pytest.approx(
             before, abs=1e-13
@@ -371,14 +371,14 @@ def test_sensor_reports_the_environment_at_the_start_of_the_step() -> None:
     model, data = compiled(BODY, Environment(orbit=ELLIPTIC, torques=[torque]), step=0.5)
     data.qpos[:3], data.qpos[3:7], data.time = [30.0, 20.0, 10.0], TUMBLING, 8.0
     mujoco.mj_forward(model, data)
-    wanted = data.qfrc_passive.copy()
-    assert np.abs(wanted).min() > 1e-9
+    expected = data.qfrc_passive.copy()
+    assert np.abs(expected).min() > 1e-9
     # its centre of mass is the bus's origin
-    np.testing.assert_allclose(data.sensordata, wanted, rtol=1e-14)
+    np.testing.assert_allclose(data.sensordata, expected, rtol=1e-14)
     before = data.sensordata.copy()
     mujoco.mj_step(model, data)
     np.testing.assert_array_equal(data.sensordata, before)
-    assert np.abs(data.qfrc_passive - wanted).max() > 1e-3  # that of the last stage
+    assert np.abs(data.qfrc_passive - expected).max() > 1e-3  # that of the last stage
 
 
 BOOM = f"""<mujoco>{OPTION}
@@ -487,7 +487,7 @@ def _small(xml: str, numbers: int = 50) -> Callable[[], Any]:
         (BODY.replace("<flag ", '<flag spring="disable" damper="disable" '), 50, {}, "enable one"),
     ],
 )
-def test_models_that_will_not_do(
+def test_unusable_models_are_refused(
     xml: str, numbers: int, friction: dict[str, float], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):

@@ -46,9 +46,9 @@ def test_orbit_is_a_solution_of_the_two_body_problem(body: str) -> None:
         return np.concatenate([state[3:], -GM[body] * place / np.linalg.norm(place) ** 3])
 
     start = np.concatenate([orbit_position(orbit, 0.0), velocity])
-    wanted = solve_ivp(motion, (0.0, 3e4), start, "DOP853", times, rtol=1e-13, atol=1e-6).y[:3].T
+    expected = solve_ivp(motion, (0.0, 3e4), start, "DOP853", times, rtol=1e-13, atol=1e-6).y[:3].T
     # 2e7 m at 1e-16 over a step gives 5e-9 m/s, which grows to about 3 n t times as much in 3e4 s
-    assert np.abs(orbit_position(orbit, times) - wanted).max() < 5e-3
+    assert np.abs(orbit_position(orbit, times) - expected).max() < 5e-3
 
 
 def test_elements_mean_what_they_say() -> None:

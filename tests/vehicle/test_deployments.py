@@ -34,7 +34,7 @@ def profile(at: float = 10.0, length: float = 6.0, ramp: float = 10.0) -> Boom:
 
 
 @pytest.mark.parametrize(("length", "ramp"), [(6.0, 10.0), (6.0, 0.0), (0.3, 10.0), (0.3, 1.0)])
-def test_a_boom_is_told_to_go_where_it_shall_and_no_faster(length: float, ramp: float) -> None:
+def test_a_boom_is_commanded_to_its_end_and_no_faster(length: float, ramp: float) -> None:
     boom = profile(length=length, ramp=ramp)
     times = np.linspace(0.0, boom.end + 10.0, 4_001)
     place, rate = np.array([boom.desired(time) for time in times]).T
