@@ -1,6 +1,8 @@
 """Flying again from the log alone."""
 
+import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +16,7 @@ from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.runner.replay import (
     Difference,
+    _other_streams,
     assembly_of,
     first_difference,
     replay,
@@ -21,7 +24,7 @@ from mjspace.runner.replay import (
     verify,
 )
 from mjspace.runner.run import Result, run
-from mjspace.scenario.loading import component, to_toml
+from mjspace.scenario.loading import component, to_toml, validate
 from mjspace.scenario.scenario import Scenario
 from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
@@ -382,3 +385,26 @@ def test_under_another_law_what_looks_at_the_law_is_left_out(noisy: Result, tmp_
     (tmp_path / "damper.py").write_text(DAMPER)
     result = replay(path, tmp_path / "out", law=component("damper.py:Damper", []), folder=tmp_path)
     assert [verdict.check.name for verdict in result.verdicts] == ["after turning", "always"]
+
+
+@pytest.mark.parametrize(
+    ("table", "reason"),
+    [
+        ("noise = 0.01", "other random streams: verify it with version 0.1.0, revision abc"),
+        ("delay = 0.01", ""),
+        ("measures = 'rate'\nnoise_std = 0.01", ""),
+    ],
+)
+def test_noise_of_an_earlier_version_is_the_reason_of_a_difference(table: str, reason: str) -> None:
+    text = (
+        "description = 'x'\nduration = 1\n[reference]\nkind = 'references:Hold'\n"
+        f"[law]\nkind = 'coast:Coast'\n[sensors.rate]\n{table}\n"
+    )
+    logged: Any = SimpleNamespace(
+        attachment=lambda name: text.encode(), metadata={"mjspace": "0.1.0", "git": "abc"}
+    )
+    scenario = validate(tomllib.loads(text), "log", context={"flown": True})
+    assert _other_streams(logged, scenario).endswith(reason)
+    assert bool(_other_streams(logged, scenario)) == bool(reason)
+    difference = Difference(0.0, "/state", "physics", 0, 1.0, 2.0, _other_streams(logged, scenario))
+    assert str(difference).endswith(reason or "flown 2.0")
