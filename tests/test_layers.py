@@ -37,7 +37,7 @@ ROOMS = {
     "actuators": "constants contract environment errors scenario sensors signals units vehicle",
     "log": "attitude contract scenario units",
     "plotting": "contract log scenario signals units",
-    "rendering": "attitude contract environment errors log scenario vehicle",
+    "rendering": "attitude contract environment errors log vehicle",
     "simulation": "actuators attitude contract environment errors scenario sensors signals vehicle",
     "runner": "contract errors log scenario signals simulation units vehicle",
     "dm_env": "attitude contract environment errors scenario simulation",

@@ -75,10 +75,11 @@ def test_the_version_of_the_terms_is_that_of_their_text(
     assert kernel.version_of_terms() != before
 
 
-def test_scenarios_are_read_without_the_compiler_and_the_physics() -> None:
+def test_the_environment_is_read_without_the_compiler_and_the_physics() -> None:
     code = (
         "import sys; sys.modules.update(numba=None, mujoco=None)\n"
-        "from mjspace.scenario.loading import load\n"
-        "load('b-dot')"
+        "from mjspace.scenario.environment import Environment\n"
+        "orbit = {'semi_major_axis': '7000 km'}\n"
+        "Environment.model_validate({'orbit': orbit, 'magnetic_field': {}})"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

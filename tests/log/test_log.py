@@ -270,7 +270,7 @@ def test_a_slow_chunk_is_not_overtaken(tmp_path: Path, monkeypatch: pytest.Monke
         ({"time": np.array([0.0])}, "do not increase"),
         ({"time": np.array([-1e-3])}, "starts at zero"),
         ({"time": np.array([np.nan])}, "starts at zero"),
-        ({"attitude": np.zeros(4)}, r"/truth.attitude: shape \(4,\), wanted \(1, 4\)"),
+        ({"attitude": np.zeros(4)}, r"/truth.attitude: shape \(4,\), should be \(1, 4\)"),
     ],
 )
 def test_what_cannot_be_logged_is_refused(

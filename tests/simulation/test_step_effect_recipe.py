@@ -31,7 +31,7 @@ def module(name: str, path: Path) -> Any:
 def recipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Add the recipe's file, and its line to the list of effects; return the file's module."""
     section = PAGE.read_text().partition("## A step effect\n")[2].partition("\n## ")[0]
-    file, line = re.findall(r"^```python[^\n]*\n(.*?)^```$", section, re.M | re.S)
+    file, line = re.findall(r"^```(?:python|text)[^\n]*\n(.*?)^```$", section, re.M | re.S)
     monkeypatch.setitem(sys.modules, MODULE, None)  # restored after the test
     (tmp_path / "outgassing.py").write_text(file)
     found = module(MODULE, tmp_path / "outgassing.py")

@@ -1,6 +1,7 @@
 """The cascade of the double-gimbal CMG: its own arithmetic; that it flies is shown on the plant."""
 
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ def seen(vehicles: int, seed: int = 0) -> Measurement:
 
 
 def one(arrays: Any, index: int) -> Any:
+    if isinstance(arrays, Measurement):
+        return arrays._map(itemgetter(index))
     return type(arrays)(*(a[index] if a.size else a for a in arrays))
 
 

@@ -1,5 +1,6 @@
 """The cascade without sensors on its wheel: what it may not know, and what it finds out."""
 
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ def seen(vehicles: int) -> Measurement:
 
 
 def one(arrays: Any, index: int) -> Any:
+    if isinstance(arrays, Measurement):
+        return arrays._map(itemgetter(index))
     return type(arrays)(*(a[index] if a.size else a for a in arrays))
 
 

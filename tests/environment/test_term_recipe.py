@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FENCE = re.compile(r"^```(\w+)(?: (file|into)=(\S+))?\n(.*?)^```$", re.M | re.S)
+FENCE = re.compile(r'^```(\w+)(?: title="(into )?(\S+)")?\n(.*?)^```$', re.M | re.S)
 ABOVE = "    python: str | None"
 """The line above which the recipe has its own written."""
 
@@ -24,10 +24,10 @@ def test_a_native_disturbance_is_one_file_and_one_line(tmp_path: Path) -> None:
     commands, changed = [], []
     for language, how, place, text in FENCE.findall(section):
         path = tmp_path / place
-        if how == "file":
+        if place and not how:
             assert not path.exists()
             path.write_text(text)
-        elif how == "into":
+        elif how:
             before = path.read_text()
             assert before.count(ABOVE) == 1
             path.write_text(before.replace(ABOVE, text + ABOVE))

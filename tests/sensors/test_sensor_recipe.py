@@ -31,7 +31,7 @@ class Leveller:
 
 
 def block(file: str) -> str:
-    found = re.search(rf"^```\w+ file={file}\n(.*?)^```$", RECIPE, re.M | re.S)
+    found = re.search(rf'^```\w+ title="\S*{file}"\n(.*?)^```$', RECIPE, re.M | re.S)
     assert found is not None, file
     return found[1]
 
