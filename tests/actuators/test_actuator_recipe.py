@@ -121,7 +121,8 @@ def test_what_it_raises_in_flight_is_reported_as_its_own(
     recipe: type[Scenario], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys.modules[MODULE].np, "clip", lambda *_: 1 / 0)
-    message = r"the actuator Throttle \(ion_thrust\) raised ZeroDivisionError at test_actuator_recipe.py:\d+"
+    where = r"test_actuator_recipe\.py:\d+"
+    message = rf"the actuator Throttle \(ion_thrust\) raised ZeroDivisionError at {where}"
     with pytest.raises(FlightError, match=message):
         fly(recipe, tmp_path, thrust=1.0)
 
