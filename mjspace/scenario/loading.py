@@ -78,13 +78,13 @@ def validate(
     try:
         return Scenario.model_validate(table, context=dict(context))
     except ValidationError as error:
-        told: dict[str, list[str]] = {}
+        by_source: dict[str, list[str]] = {}
         for problem in error.errors():
             text = _explain(".".join(str(part) for part in problem["loc"]), problem)
             key = text.partition(":")[0]
             source = next((o for k, o in origins.items() if _related(k, key)), where)
-            told.setdefault(source, []).append(text)
-        raise InputError("; ".join(f"{s}: {'; '.join(p)}" for s, p in told.items())) from None
+            by_source.setdefault(source, []).append(text)
+        raise InputError("; ".join(f"{s}: {'; '.join(p)}" for s, p in by_source.items())) from None
 
 
 def component(kind: str, gains: Iterable[str]) -> Component:

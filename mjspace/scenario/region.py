@@ -1,4 +1,4 @@
-"""Where a signal is wanted, or watched: between bounds."""
+"""Regions of a signal: the values between bounds."""
 
 from typing import Any, Self
 

@@ -39,7 +39,7 @@ class Component(BaseModel):
 
 
 class SignalRegion(Region):
-    """Where a logged signal is wanted, or watched."""
+    """A region of a logged signal, with a name."""
 
     name: str
     """What it says in the table of checks, or in the log."""
