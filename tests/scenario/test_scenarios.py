@@ -13,7 +13,7 @@ from mjspace.runner.checks import Verdict
 from mjspace.runner.run import Result, run
 from mjspace.scenario.loading import load, scenario_names
 
-pytestmark = pytest.mark.filterwarnings("ignore::mjspace.plant.UnphysicalInertiaWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::mjspace.vehicle.vehicle.UnphysicalInertiaWarning")
 
 LONG = 100_000  # integration steps: a quarter of a minute, on a busy machine half of one
 FLAGSHIPS = {"dgvscmg-tracking", "lander"}  # flown whole however long
