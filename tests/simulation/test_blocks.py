@@ -115,7 +115,7 @@ def digests(names: list[str], threads: int | None) -> list[str]:
     alone = {key: value for key, value in os.environ.items() if key not in LIBRARIES}
     if threads is not None:
         alone |= dict.fromkeys(LIBRARIES, str(threads))
-    code = DIGESTS.format(folder=str(Path(__file__).parents[1]), names=names)
+    code = DIGESTS.format(folder=str(Path(__file__).parent), names=names)
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code],
         env=alone, check=True, capture_output=True, text=True,
