@@ -2,9 +2,15 @@
 
 import difflib
 import sys
+import sysconfig
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+
+_LIBRARIES = tuple(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
+_TESTBED = Path(__file__).parent
 
 
 class InputError(ValueError):
@@ -32,6 +38,17 @@ def input_error_at(key: str) -> Iterator[None]:
         raise InputError(message if named else f"{key}: {message}") from error
 
 
+def failure(who: str, error: Exception) -> FlightError:
+    """Return the error that says what ``who`` raised, and at which line of the user's code.
+
+    Where none of the user's code is involved, it is the line of the testbed's.
+    """
+    place = _place(error)
+    hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
+    message = " ".join(str(error).split())
+    return FlightError(f"{who} raised {type(error).__name__} at {place}: {message}{hint}")
+
+
 def nearest(name: str, names: Any) -> str:
     """Return ``": nearest is 'x' (have a, b, x)"`` for an error message."""
     near = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
@@ -42,3 +59,18 @@ def nearest(name: str, names: Any) -> str:
 def print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Print a warning as one line, in place of ``warnings.showwarning``."""
     print(f"mjspace: warning: {message}", file=sys.stderr)
+
+
+def _place(error: Exception) -> str:
+    """Return "file.py:line" of the innermost frame of the user's, else of the testbed's."""
+    frames = traceback.extract_tb(error.__traceback__)
+    users = [frame for frame in frames if _is_users(Path(frame.filename))]
+    ours = [frame for frame in frames if Path(frame.filename).is_relative_to(_TESTBED)]
+    frame = (users or ours or frames)[-1]
+    return f"{Path(frame.filename).name}:{frame.lineno}"
+
+
+def _is_users(path: Path) -> bool:
+    if path.is_relative_to(_TESTBED):
+        return path.is_relative_to(_TESTBED / "controllers")
+    return not any(path.is_relative_to(library) for library in _LIBRARIES)

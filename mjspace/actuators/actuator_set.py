@@ -1,17 +1,15 @@
 """Actuators of several kinds side by side, each of which obeys its own fields of the command."""
 
-import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from mjspace.actuators.base import Actuator, Input, State
+from mjspace.actuators.base import Actuator, Fields, Input, State
 from mjspace.contract import Array, Measurement
-from mjspace.errors import FlightError
+from mjspace.errors import FlightError, failure
 
 Result = TypeVar("Result")
 
@@ -21,6 +19,8 @@ class ActuatorSet:
     """All that acts on a batch of vehicles; the fields of their states have different names."""
 
     kinds: tuple[Actuator, ...]
+    _declared: tuple[tuple[Fields, int], ...] = field(init=False, repr=False)
+    """What each kind takes, and how many numbers it applies to a vehicle: looked up once."""
 
     def __post_init__(self) -> None:
         """Refuse kinds that would overwrite each other.
@@ -34,6 +34,8 @@ class ActuatorSet:
                 raise ValueError(f"{names} both drive {_described(one.drives)}: give one")
             if one.logged_as == other.logged_as:
                 raise ValueError(f"{names} are both logged as command.{one.logged_as}: give one")
+        declared = tuple((kind.takes, kind.drives.width) for kind in self.kinds)
+        object.__setattr__(self, "_declared", declared)
 
     @property
     def stateful(self) -> bool:
@@ -81,13 +83,14 @@ class ActuatorSet:
                 applies an array of another shape than that of its input.
         """
         applied, saturated = [], []
-        for kind in self.kinds:
-            _check(command, kind, len(truth.rate))
+        vehicles = len(truth.rate)
+        for kind, (takes, width) in zip(self.kinds, self._declared, strict=True):
+            _check(command, takes, vehicles)
             after, output, cut = _of(kind, kind.act, state, command, truth, step)
-            if output.shape != (len(truth.rate), kind.drives.width):
+            if output.shape != (vehicles, width):
                 raise FlightError(
                     f"the actuator {type(kind).__name__} applies an array of shape {output.shape}: "
-                    f"it must be {(len(truth.rate), kind.drives.width)}"
+                    f"it must be {(vehicles, width)}"
                 )
             state = state | after
             applied.append(output)
@@ -144,19 +147,16 @@ def _of(kind: Actuator, method: Callable[..., Result], *arguments: Any) -> Resul
     try:
         return method(*arguments)
     except Exception as error:
-        frame = traceback.extract_tb(error.__traceback__)[-1]
-        raise FlightError(
-            f"the actuator {type(kind).__name__} ({kind.logged_as}) raised {type(error).__name__} "
-            f"at {Path(frame.filename).name}:{frame.lineno}: {error}"
-        ) from error
+        name = f"the actuator {type(kind).__name__} ({kind.logged_as})"
+        raise failure(name, error) from error
 
 
-def _check(command: Any, kind: Actuator, vehicles: int) -> None:
-    """Raise FlightError where the law's ``command`` lacks a field that ``kind`` obeys.
+def _check(command: Any, takes: Fields, vehicles: int) -> None:
+    """Raise FlightError where the law's ``command`` lacks a field that an actuator ``takes``.
 
     Every field has the vehicle axis first, as the log has.
     """
-    for name, (width, unit) in kind.takes.items():
+    for name, (width, unit) in takes.items():
         value = getattr(command, name, None)
         shape = (vehicles, *((width,) if isinstance(width, int) else width))
         if isinstance(value, np.ndarray) and value.shape == shape and value.dtype == float:

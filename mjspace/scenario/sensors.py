@@ -1,12 +1,12 @@
 """A scenario's sensors, by name: their kinds, and which quantity each measures."""
 
-from importlib import import_module
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ValidationInfo
 
 from mjspace.contract import REPORTED_BY_PLANT
 from mjspace.errors import nearest
+from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import Name
 
@@ -35,8 +35,7 @@ def kind_of(quantity: str) -> Any:
     """
     if quantity not in KINDS:
         raise ValueError(f"no sensor measures {quantity!r}{nearest(str(quantity), KINDS)}")
-    module, _, name = KINDS[quantity].partition(":")
-    return getattr(import_module(module), name)
+    return DeclaredIn(KINDS[quantity]).table
 
 
 def kinds() -> list[type[BaseModel]]:

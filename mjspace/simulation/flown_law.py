@@ -3,14 +3,13 @@
 from typing import Any
 
 from mjspace.contract import DesiredMotion, Law, Measurement
-from mjspace.errors import FlightError
+from mjspace.errors import FlightError, failure
 from mjspace.simulation.user_code import (
     check_inner,
     check_same_shapes,
     check_state,
     check_step,
     check_vehicle_axis,
-    failure,
     read_only,
     shapes_of,
 )

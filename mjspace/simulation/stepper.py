@@ -10,7 +10,7 @@ from mujoco.batch import Batch, SimulationError
 from mjspace import attitude
 from mjspace.contract import Array, Measurement
 from mjspace.environment.install import install_callbacks
-from mjspace.errors import FlightError, InputError
+from mjspace.errors import FlightError, InputError, failure
 from mjspace.simulation import mujoco_warnings
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
@@ -18,8 +18,8 @@ from mjspace.simulation.effects import effects_of
 from mjspace.simulation.initial_state import Start
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
-from mjspace.simulation.user_code import failure, sealed
-from mjspace.vehicle.step_effect import Instant
+from mjspace.simulation.user_code import sealed
+from mjspace.vehicle.step_effect import Instant, StepEffect
 
 InnerLoop = Callable[[float, Any, Measurement], Any]
 """Returns the motors' command of an integration step from (time [s], the law's command,
@@ -61,6 +61,12 @@ class Stepper:
         self.effects = effects_of(assembly, self.layout, members)
         for effect in self.effects:
             effect.bind(self.batch)
+        # Most effects have few of the hooks: the others are not called in every step.
+        self._hooks = {
+            hook: [each for each in self.effects if getattr(type(each), hook) is not default]
+            for hook, default in vars(StepEffect).items()
+            if callable(default)
+        }
         rates = assembly.scenario.rates
         self._steps, self._control, self._physics = rates.steps, rates.control, rates.physics
         self._tick = math.gcd(self._steps, *self._suite.ticks)
@@ -180,13 +186,8 @@ class Stepper:
         if self._inner is not None:
             command = self._inner(now, command, measurement)
         memory, applied, saturated = self._actuators.act(self.memory, command, truth, self._hold)
-        for effect in self.effects:
-            try:
-                memory, applied = effect.change(memory, applied, instant)
-            except _LOCATED:
-                raise
-            except Exception as error:
-                raise failure(effect.name, error) from error
+        for effect in self._hooks["change"]:
+            memory, applied = _of(effect, effect.change, memory, applied, instant)
         self.memory = memory
         for view, values in zip(self._inputs, applied, strict=True):
             view[:] = values
@@ -194,13 +195,8 @@ class Stepper:
 
     def _each_effect(self, hook: str, *arguments: Any) -> None:
         """Call the ``hook`` of ``StepEffect`` that changes the memory alone on each effect."""
-        for effect in self.effects:
-            try:
-                self.memory = getattr(effect, hook)(self.memory, *arguments)
-            except _LOCATED:
-                raise
-            except Exception as error:
-                raise failure(effect.name, error) from error
+        for effect in self._hooks[hook]:
+            self.memory = _of(effect, getattr(effect, hook), self.memory, *arguments)
 
     def _prepare_step(self, instant: Instant) -> Array | None:
         """Let the effects act for the step that begins; apply and return the sum of wrenches."""
@@ -212,3 +208,13 @@ class Stepper:
         self._on_bus[:, :3] = total[:, :3]
         self._on_bus[:, 3:] = attitude.rotate(instant.truth.attitude, total[:, 3:])
         return total
+
+
+def _of(effect: StepEffect, method: Callable[..., Any], *arguments: Any) -> Any:
+    """Return what the ``method`` of ``effect`` returns; an error names the effect."""
+    try:
+        return method(*arguments)
+    except _LOCATED:
+        raise
+    except Exception as error:
+        raise failure(effect.name, error) from error

@@ -1,15 +1,12 @@
-"""What users' code receives is read-only, what it returns is checked, what it raises is located."""
+"""What users' code receives is read-only, and what it returns is checked."""
 
-import sysconfig
-import traceback
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from mjspace.contract import Array, DesiredMotion, Measurement, Reference, ReferenceSource
-from mjspace.errors import FlightError
+from mjspace.errors import FlightError, failure
 
 Tuple = TypeVar("Tuple", bound=Iterable[Any])
 
@@ -17,9 +14,6 @@ STEP = (
     "it must return (state, command, signals), each a named tuple of arrays; state and signals may "
     "be None"
 )
-
-_LIBRARIES = tuple(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
-_TESTBED = Path(__file__).parents[1]
 
 
 def read_only(arrays: Tuple) -> Tuple:
@@ -41,17 +35,6 @@ def sealed(measurement: Measurement) -> Measurement:
         if array.flags.writeable:
             array.setflags(write=False)
     return measurement
-
-
-def failure(who: str, error: Exception) -> FlightError:
-    """Return the error that says what ``who`` raised, and at which line of the user's code.
-
-    Where none of the user's code is involved, it is the line of the testbed's.
-    """
-    place = _place(error)
-    hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
-    message = " ".join(str(error).split())
-    return FlightError(f"{who} raised {type(error).__name__} at {place}: {message}{hint}")
 
 
 def reference_at(source: ReferenceSource, time: Array) -> DesiredMotion:
@@ -190,18 +173,3 @@ def _described(value: Any) -> str:
     if type(value) is tuple:
         return f"({', '.join(map(_described, value))})"
     return "None" if value is None else f"a {type(value).__name__}"
-
-
-def _place(error: Exception) -> str:
-    """Return "file.py:line" of the innermost frame of the user's, else of the testbed's."""
-    frames = traceback.extract_tb(error.__traceback__)
-    users = [frame for frame in frames if _is_users(Path(frame.filename))]
-    ours = [frame for frame in frames if Path(frame.filename).is_relative_to(_TESTBED)]
-    frame = (users or ours or frames)[-1]
-    return f"{Path(frame.filename).name}:{frame.lineno}"
-
-
-def _is_users(path: Path) -> bool:
-    if path.is_relative_to(_TESTBED):
-        return path.is_relative_to(_TESTBED / "controllers")
-    return not any(path.is_relative_to(library) for library in _LIBRARIES)

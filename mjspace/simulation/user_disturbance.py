@@ -5,10 +5,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mjspace.contract import Array, Truth
-from mjspace.errors import FlightError
+from mjspace.errors import FlightError, failure
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.state_layout import StateLayout
-from mjspace.simulation.user_code import failure, read_only
+from mjspace.simulation.user_code import read_only
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 
