@@ -67,6 +67,10 @@ class Stepper:
             for hook, default in vars(StepEffect).items()
             if callable(default)
         }
+        self._hooks_between = {
+            hook: [each for each in effects if each.every_step]
+            for hook, effects in self._hooks.items()
+        }
         rates = assembly.scenario.rates
         self._steps, self._control, self._physics = rates.steps, rates.control, rates.physics
         self._tick = math.gcd(self._steps, *self._suite.ticks)
@@ -142,7 +146,7 @@ class Stepper:
                     np.maximum(period.saturated, saturated, out=period.saturated)
                 self._prepare_step(instant)
                 self.batch.step()
-                self._each_effect("after_step", instant)
+                self._each_effect("after_step", instant, between=True)
                 step += 1
             else:
                 count = self._tick - step % self._tick
@@ -193,14 +197,17 @@ class Stepper:
             view[:] = values
         return applied, saturated
 
-    def _each_effect(self, hook: str, *arguments: Any) -> None:
-        """Call the ``hook`` of ``StepEffect`` that changes the memory alone on each effect."""
-        for effect in self._hooks[hook]:
+    def _each_effect(self, hook: str, *arguments: Any, between: bool = False) -> None:
+        """Call the ``hook`` of ``StepEffect`` that changes the memory alone on each effect.
+
+        ``between`` control instants only those act that do so in every integration step.
+        """
+        for effect in (self._hooks_between if between else self._hooks)[hook]:
             self.memory = _of(effect, getattr(effect, hook), self.memory, *arguments)
 
     def _prepare_step(self, instant: Instant) -> Array | None:
         """Let the effects act for the step that begins; apply and return the sum of wrenches."""
-        self._each_effect("before_step", instant)
+        self._each_effect("before_step", instant, between=not instant.is_control)
         wrenches = [effect.wrench for effect in self.effects if effect.wrench is not None]
         if not wrenches:
             return None
