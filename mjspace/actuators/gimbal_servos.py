@@ -1,21 +1,18 @@
 """Speed loops on gimbals and on the wheels in them: rates in, torques on joints out."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numba import guvectorize
 
 from mjspace.actuators.base import (
-    Actuator,
     ActuatorTable,
     Context,
     Fields,
-    Input,
     State,
-    motors,
 )
-from mjspace.actuators.driven_hinges import gimbals_and_wheels, motor_order
+from mjspace.actuators.driven_hinges import HingeMotors, gimbals_and_wheels
 from mjspace.contract import Array, Measurement
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import Finite, NonNegative, Positive, Si, Table
@@ -69,11 +66,11 @@ class Servos(ActuatorTable, Table):
         rows = [gimbal] * len(driven.gimbals) + [wheel] * len(driven.wheels)
         loops = [[np.inf if number is None else number for number in row] for row in rows]
         wheel_speed = np.full(len(driven.wheels), self.wheel_speed)
-        return GimbalServos(np.array(loops), wheel_speed, driven)
+        return GimbalServos(np.array(loops), wheel_speed, driven=driven)
 
 
 @dataclass(frozen=True)
-class GimbalServos(Actuator):
+class GimbalServos(HingeMotors):
     """Gimbals that obey a ``GimbalRateCommand``, and wheels that keep their speed.
 
     A motor's torque is held for an integration step, and has its reaction on what carries the
@@ -84,21 +81,6 @@ class GimbalServos(Actuator):
     """Gain, integral gain, limits of torque and rate of each gimbal, then each wheel; (m, 4)."""
     wheel_speed: Array
     """Desired of each wheel [rad/s], shape (n,)."""
-    driven: Driven
-    order: Any = field(init=False, repr=False)
-    """Where each motor's hinge is among gimbals and wheels, shape (m,)."""
-
-    logged_as: ClassVar[str] = "motor_torque"
-    unit: ClassVar[str] = "N m"
-    stateful: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "order", motor_order(self.driven))
-
-    @property
-    def drives(self) -> Input:
-        """The hinges' motors."""
-        return motors(self.driven.motors)
 
     @property
     def takes(self) -> Fields:

@@ -1,21 +1,18 @@
 """Electric motors on hinges, as the actuators of a vehicle: voltages in, torques on joints out."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import ConfigDict, RootModel
 
 from mjspace.actuators.base import (
-    Actuator,
     ActuatorTable,
     Context,
     Fields,
-    Input,
     State,
-    motors,
 )
-from mjspace.actuators.driven_hinges import gimbals_and_wheels, motor_order
+from mjspace.actuators.driven_hinges import HingeMotors, gimbals_and_wheels
 from mjspace.actuators.pmsm import Drives, Pmsm
 from mjspace.contract import Array, Measurement
 from mjspace.scenario.equipment import Driven
@@ -49,30 +46,16 @@ class DriveTables(ActuatorTable, RootModel[dict[Name, Pmsm]]):
     def actuator(self, context: Context) -> "MotorDrives":
         """Return the drives of a vehicle's driven hinges."""
         tables = [self.root[name] for name in context.driven.motors]
-        return MotorDrives(Drives.of(tables), context.driven)
+        return MotorDrives(Drives.of(tables), driven=context.driven)
 
 
 @dataclass(frozen=True)
-class MotorDrives(Actuator):
+class MotorDrives(HingeMotors):
     """Synchronous motors with their currents; each pushes against what carries its rotor."""
 
     electrical: Drives
-    driven: Driven
-    order: Any = field(init=False, repr=False)
-    """Where each motor's speed is among gimbal rates and wheel speeds, shape (m,)."""
 
-    logged_as: ClassVar[str] = "motor_torque"
-    unit: ClassVar[str] = "N m"
     measures: ClassVar[dict[str, str]] = {"current": "A"}
-    stateful: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "order", motor_order(self.driven))
-
-    @property
-    def drives(self) -> Input:
-        """The hinges' motors."""
-        return motors(self.driven.motors)
 
     @property
     def takes(self) -> Fields:
