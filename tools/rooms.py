@@ -14,6 +14,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs/architecture.md"
 PICTURE = ROOT / "docs/rooms.svg"
+LAYERS = runpy.run_path(str(ROOT / "tests/test_layers.py"))
+levels = LAYERS["levels"]
 BEGIN, END = "<!-- rooms: tools/rooms.py -->\n", "<!-- end of rooms -->"
 
 # Pixels: a box, the space between boxes and between levels, and the margin.
@@ -27,16 +29,7 @@ Node = str | tuple[str, str, int]
 
 def imports() -> Imports:
     """Return the imports of each room, in the order of tests/test_layers.py."""
-    layers = runpy.run_path(str(ROOT / "tests/test_layers.py"))
-    return {room: frozenset(layers["imports_of"](room)) for room in layers["ROOMS"]}
-
-
-def levels(rooms: Imports) -> dict[str, int]:
-    """Return the level of each room: one above the highest that it imports; 1 on the ground."""
-    found: dict[str, int] = {}
-    for room, below in rooms.items():
-        found[room] = 1 + max((found[other] for other in below), default=0)
-    return found
+    return {room: frozenset(LAYERS["imports_of"](room)) for room in LAYERS["ROOMS"]}
 
 
 def listed(rooms: Imports) -> str:
