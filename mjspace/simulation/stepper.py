@@ -63,7 +63,11 @@ class Stepper:
             effect.bind(self.batch)
         # Most effects have few of the hooks: the others are not called in every step.
         self._hooks = {
-            hook: [each for each in self.effects if getattr(type(each), hook) is not default]
+            hook: [
+                each
+                for each in self.effects
+                if getattr(getattr(each, hook), "__func__", None) is not default
+            ]
             for hook, default in vars(StepEffect).items()
             if callable(default)
         }

@@ -251,6 +251,7 @@ def test_the_action_is_bounded_by_what_the_wheels_give() -> None:
     np.testing.assert_array_equal(environment.physics.control(), np.full(4, -5.0))
     free = at_rest().action_spec()
     assert free.maximum == pytest.approx(np.full(3, 2734.324), rel=1e-6)  # 100 x 27.34324 kg m^2
+    np.testing.assert_array_equal(free.minimum, -free.maximum)
 
 
 @pytest.mark.parametrize(

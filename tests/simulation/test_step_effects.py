@@ -113,6 +113,14 @@ def test_the_order_of_the_calls(add: Adder, every_step: bool) -> None:
     assert diary.calls == expected
 
 
+def test_an_effect_acts_no_more_often_beside_one_that_acts_in_every_step(add: Adder) -> None:
+    diary = Diary(every_step=False)
+    add(diary, Push([0.0] * 6))
+    flown(built(0.03, "duration=0.03"))
+    last = [(hook, 0.03) for hook in PERIOD[:-1]]  # whose command is not flown
+    assert diary.calls == [(hook, 0.0) for hook in PERIOD] + last
+
+
 def test_actuators_that_act_in_every_step_are_changed_in_every_step(add: Adder) -> None:
     diary = Diary(every_step=False)
     add(diary)

@@ -238,6 +238,8 @@ LINE = HEAD.count("\n") + 3
     [
         ("return 1 / 0", "ZeroDivisionError at own.py:{line}: division by zero"),
         ("x = 1; return np.linalg.inv(np.zeros((3, 3)))", "LinAlgError at own.py:{line}: Singular"),
+        # The innermost line of the user's counts.
+        ("deep = lambda: 1 / 0\n    return deep()", "ZeroDivisionError at own.py:{line}: div"),
         ("return {}['gain']", "KeyError at own.py:{line}: 'gain'"),
         ("raise ValueError('one\\n  two')", "ValueError at own.py:{line}: one two"),
     ],
