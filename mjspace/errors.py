@@ -43,7 +43,7 @@ def failure(who: str, error: Exception) -> FlightError:
 
     Where none of the user's code is involved, it is the line of the testbed's.
     """
-    place = _place(error)
+    place = place_of(error)
     hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
     message = " ".join(str(error).split())
     return FlightError(f"{who} raised {type(error).__name__} at {place}: {message}{hint}")
@@ -61,7 +61,7 @@ def print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"mjspace: warning: {message}", file=sys.stderr)
 
 
-def _place(error: Exception) -> str:
+def place_of(error: Exception) -> str:
     """Return "file.py:line" of the innermost frame of the user's, else of the testbed's."""
     frames = traceback.extract_tb(error.__traceback__)
     users = [frame for frame in frames if _is_users(Path(frame.filename))]

@@ -66,7 +66,8 @@ class ActuatorSet:
         Raises:
             ValueError: motors that do not stand side by side in ``ctrl``.
         """
-        return [batch.bind(kind.drives.array)[:, _columns(kind, batch)] for kind in self.kinds]
+        driven = [kind.drives for kind in self.kinds]
+        return [batch.bind(each.array)[:, each.slice_of(batch.model)] for each in driven]
 
     def reset(self, vehicles: int) -> State:
         """Return the state of all at the start."""
@@ -103,24 +104,9 @@ class ActuatorSet:
             truth = _of(kind, kind.measured, state, truth)
         return truth
 
-    def logged(self, applied: Sequence[tuple[Array, ...]]) -> dict[str, Array]:
-        """Return the fields of /command for what ``act`` applied in several periods."""
-        columns = zip(*applied, strict=True)
-        return {k.logged_as: np.array(c) for k, c in zip(self.kinds, columns, strict=True)}
-
-
-def _columns(kind: Actuator, batch: Any) -> slice:
-    """Return the columns that ``kind`` fills in its array."""
-    names = kind.drives.motors
-    if not names:
-        return slice(kind.drives.columns.start, kind.drives.columns.stop)
-    ids = [batch.actuator(name).id for name in names]
-    if ids != list(range(ids[0], ids[0] + len(ids))):
-        raise ValueError(
-            f"the motors of {type(kind).__name__} must stand side by side and in order in ctrl: "
-            f"{dict(zip(names, ids, strict=True))}"
-        )
-    return slice(ids[0], ids[-1] + 1)
+    def logged(self, applied: Sequence[Array]) -> dict[str, Array]:
+        """Return the fields of /command for what each kind applied."""
+        return {kind.logged_as: values for kind, values in zip(self.kinds, applied, strict=True)}
 
 
 def _overlap(one: Input, other: Input) -> bool:
@@ -159,7 +145,8 @@ def _check(command: Any, takes: Fields, vehicles: int) -> None:
     for name, (width, unit) in takes.items():
         value = getattr(command, name, None)
         shape = (vehicles, *((width,) if isinstance(width, int) else width))
-        if isinstance(value, np.ndarray) and value.shape == shape and value.dtype == float:
+        # Also an array that is traced, and no np.ndarray.
+        if getattr(value, "shape", None) == shape and getattr(value, "dtype", None) == float:
             continue  # in a quarter of a microsecond
         right = f"it must be of shape {_without_vehicles(shape)} [{unit}]"
         if value is None:

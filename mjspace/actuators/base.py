@@ -37,6 +37,20 @@ class Input:
         """How many numbers are applied to one vehicle."""
         return len(self.motors) or len(self.columns)
 
+    def slice_of(self, model: Any) -> slice:
+        """Return its columns of the array of a vehicle of that ``model``.
+
+        Raises:
+            ValueError: motors that do not stand side by side and in order in ``ctrl``.
+        """
+        if not self.motors:
+            return slice(self.columns.start, self.columns.stop)
+        ids = [model.actuator(name).id for name in self.motors]
+        if ids != list(range(ids[0], ids[0] + len(ids))):
+            found = dict(zip(self.motors, ids, strict=True))
+            raise ValueError(f"motors must stand side by side and in order in ctrl: {found}")
+        return slice(ids[0], ids[-1] + 1)
+
 
 def motors(names: Iterable[str]) -> Input:
     """Return the motors of these names in ``ctrl``, where they stand side by side."""

@@ -19,16 +19,16 @@ def _generate_pointer(typing_context: Any, word: Any) -> Any:
     return types.voidptr(types.int64), generate
 
 
-_pointer: Any = intrinsic(_generate_pointer)
+pointer: Any = intrinsic(_generate_pointer)
 
 
 @njit(cache=True)
 def ints(words: Any, word: int, count: int) -> Any:
     """Return the ``count`` C ints that the pointer at ``words[word]`` points to."""
-    return carray(_pointer(words[word]), (count,), np.int32)
+    return carray(pointer(words[word]), (count,), np.int32)
 
 
 @njit(cache=True)
 def floats(words: Any, word: int, shape: Any) -> Any:
     """Return the array of doubles, of ``shape``, that the pointer at ``words[word]`` points to."""
-    return carray(_pointer(words[word]), shape, np.float64)
+    return carray(pointer(words[word]), shape, np.float64)

@@ -37,11 +37,12 @@ _PROBE = """
       <freejoint/>
       <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
       <body>
-        <joint axis="0 0 1"/>
+        <joint name="hinge" axis="0 0 1"/>
         <inertial pos="1 0 0" mass="1" diaginertia="1 1 1"/>
       </body>
     </body>
   </worldbody>
+  <actuator><motor joint="hinge"/></actuator>
   <sensor><user dim="5"/></sensor>
 </mujoco>
 """
@@ -70,6 +71,8 @@ class DataOffsets(NamedTuple):
     time: int
     qpos: int
     qvel: int
+    ctrl: int
+    qfrc_applied: int
     userdata: int
     xipos: int
     ximat: int

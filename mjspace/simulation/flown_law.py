@@ -16,12 +16,16 @@ from mjspace.simulation.user_code import (
 
 
 class FlownLaw:
-    """A law with its state; each step is checked, and its errors are named as the law's."""
+    """A law with its state; each step is checked, and its errors are named as the law's.
+
+    Attributes:
+        state: the law's state before its next step, a named tuple or empty; None: not yet reset.
+    """
 
     def __init__(self, law: Law, state: Any, vehicles: int) -> None:
         """Fly ``law`` on so many vehicles, from its ``state``; None: it is reset at the start."""
         self._law: Any = law
-        self._state = state
+        self.state = state
         self._vehicles = vehicles
         self._first: Any = None
         self._shapes: list[tuple[int, ...]] | None = None
@@ -36,11 +40,11 @@ class FlownLaw:
                 same shapes as before.
         """
         try:
-            if self._state is None:
+            if self.state is None:
                 state = self._law.reset(measurement, reference)
                 check_state(state)
-                self._state = read_only(state or ())
-            before = self._state
+                self.state = read_only(state or ())
+            before = self.state
             returned = self._law.step(before, time, measurement, reference)
         except FlightError:
             raise
@@ -48,7 +52,7 @@ class FlownLaw:
             raise failure("the law", error) from error
         self._check(before, returned)
         state, command, signals = returned
-        self._state = read_only(state or ())
+        self.state = read_only(state or ())
         return before, read_only(command), read_only(signals or ())
 
     def inner(self, time: float, command: Any, measurement: Measurement) -> Any:
@@ -58,11 +62,11 @@ class FlownLaw:
             FlightError: the inner loop raised, or returned anything but (state, command).
         """
         try:
-            returned = self._law.inner(self._state, time, command, measurement)
+            returned = self._law.inner(self.state, time, command, measurement)
         except Exception as error:
             raise failure("the law's inner loop", error) from error
         check_inner(returned)
-        self._state = read_only(returned[0] or ())
+        self.state = read_only(returned[0] or ())
         return returned[1]
 
     def _check(self, before: Any, returned: Any) -> None:

@@ -1,4 +1,4 @@
-"""The loop: one control period, repeated, for one vehicle or many, in blocks of logged rows."""
+"""The loop: control periods of one vehicle or many, flown in blocks of logged rows."""
 
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
@@ -11,15 +11,17 @@ from mujoco.batch import SimulationError
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.compiled_blocks import CompiledBlocks
+from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.events import with_declared_events
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import Start, last_period
-from mjspace.simulation.recording import Block, Recording, until_trouble
+from mjspace.simulation.recording import Block, Columns, block_of, columns_of, until_trouble
 from mjspace.simulation.stepper import Stepper
 from mjspace.simulation.user_code import reference_at
 
-BLOCK_PERIODS = 500
-BLOCK_BYTES = 8_000_000  # of many vehicles: what has been recorded should still be in the cache
+BLOCK_PERIODS = 2000
+BLOCK_BYTES = 32_000_000  # of many vehicles, about
 BLOCK_SECONDS = 0.25  # of wall time: a kill may cost three blocks, and should not cost a second
 
 
@@ -34,7 +36,8 @@ def fly(
     """Fly the scenario from ``start`` to its end and yield what happened, block by block.
 
     A row holds the state at its time, and the measurement, reference and command of that instant;
-    the last row's command is not flown. ``stop`` is called each period, and True ends the flight.
+    the last row's command is not flown. ``stop`` is called each period, or each block where its
+    inside is compiled, and True ends the flight.
 
     Raises:
         FlightError: the flight cannot go on; every good period has been yielded before.
@@ -46,12 +49,13 @@ def fly(
     declared = assembly.scenario.events
     inside = np.zeros((len(members), len(declared)), dtype=bool)
     period = start.period
+    layout, effects = flight.stepper.layout, flight.stepper.effects
     while period <= last:
-        recording, trouble = flight.record(period, last, stop)
-        if trouble is not None and not len(recording):
-            raise trouble
-        block = recording.block(assembly, flight.stepper.layout, flight.stepper.effects, saturated)
-        block, problem = until_trouble(block, flight.stepper.layout)
+        columns, desired, trouble = flight.record(period, last, stop)
+        if columns is None:
+            raise trouble or AssertionError
+        block = block_of(period, desired, columns, assembly, layout, effects, saturated)
+        block, problem = until_trouble(block, layout)
         if len(block.time):
             block, inside = with_declared_events(block, declared, inside)
             yield block
@@ -61,8 +65,8 @@ def fly(
             raise trouble
         if stop():
             return
-        saturated = recording.periods[-1].saturated.astype(bool)
-        period += len(recording)
+        saturated = columns.saturated[-1].astype(bool)
+        period += len(columns.physics)
 
 
 class _Flight:
@@ -75,50 +79,75 @@ class _Flight:
         self._law = FlownLaw(assembly.law, start.law, len(members))
         inner = self._law.inner if assembly.inner else None
         self.stepper = Stepper(assembly, start, members, threads=threads, inner=inner)
+        self._compiled = CompiledBlocks(assembly, start, self.stepper, self._law, threads)
         # Each period, with law, signals and measurement.
         recorded = 4 * self.stepper.batch.state.nbytes
         self._periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
 
     def record(
         self, first: int, last: int, stop: Callable[[], bool]
-    ) -> tuple[Recording, FlightError | None]:
-        """Fly a block of periods; return its recording, and why it cannot go on, if it cannot."""
-        control = self._control
-        end = min(first + self._periods - 1, last)
-        times = np.arange(first, end + 1, dtype=float) * control
+    ) -> tuple[Columns | None, DesiredMotion, FlightError | None]:
+        """Fly a block of periods; return what it recorded, what was desired, and what ended it.
+
+        Where the period can be compiled, its first is flown in Python, and proves the rest.
+        """
+        count = min(self._periods, last - first + 1)
+        if self._compiled.on:
+            count = min(count, self._compiled.periods_in(BLOCK_SECONDS))
+        times = np.arange(first, first + count, dtype=float) * self._control
         desired = reference_at(self._assembly.reference, times)
-        recording = Recording(first, desired)
+        in_python = 1 if self._compiled.on else count
+        periods, trouble = self._fly_in_python(first, in_python, last, desired, stop)
+        columns = columns_of(periods) if periods else None
+        if self._compiled.on and columns is not None and trouble is None and count > 1:
+            columns = self._compiled.fly(periods[0], columns, count, last, desired)
+        return columns, desired, trouble
+
+    def _fly_in_python(
+        self,
+        first: int,
+        count: int,
+        last: int,
+        desired: DesiredMotion,
+        stop: Callable[[], bool],
+    ) -> tuple[list[ControlPeriod], FlightError | None]:
+        periods: list[ControlPeriod] = []
         due = clock.monotonic() + BLOCK_SECONDS
-        now = first * control
+        now = first * self._control
         try:
             # A law's infinities are found in what it commands, not in NumPy's warnings.
             with np.errstate(all="ignore"):
-                rows: Any = zip(*desired, strict=True)
+                rows: Any = zip(*(array[:count] for array in desired), strict=True)
                 for number, row in enumerate(rows, first):
-                    now, reference = number * control, type(desired)(*row)
-                    self._fly_period(recording, number, reference, flown=number < last)
+                    now, reference = number * self._control, type(desired)(*row)
+                    self._fly_period(periods, number, reference, flown=number < last)
                     if stop() or clock.monotonic() > due:
                         break
         except (SimulationError, FlightError) as error:
             trouble = FlightError(f"stopped at t = {now:.6g} s: {error}")
             trouble.__cause__ = error.__cause__ or error
-            return recording, trouble
+            return periods, trouble
         raised = np.flatnonzero(self.stepper.batch.warning[:, :, 1].any(axis=0))
         if len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name
-            return recording, FlightError(
-                f"MuJoCo warned ({warning}) between t = {first * control:.6g} s and now"
+            return periods, FlightError(
+                f"MuJoCo warned ({warning}) between t = {first * self._control:.6g} s and now"
             )
-        return recording, None
+        return periods, None
 
     def _fly_period(
-        self, recording: Recording, number: int, reference: DesiredMotion, *, flown: bool
+        self,
+        periods: list[ControlPeriod],
+        number: int,
+        reference: DesiredMotion,
+        *,
+        flown: bool,
     ) -> None:
         period = self.stepper.sense(number)
         period.law, period.command, period.signals = self._law.step(
             period.time, period.measurement, reference
         )
         self.stepper.begin(period, flown=flown)
-        recording.periods.append(period)
+        periods.append(period)
         if flown:
             self.stepper.finish(period)

@@ -66,90 +66,111 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
     return replace(block, time=block.time[:first], rows=rows, events=events), problem
 
 
-@dataclass
-class Recording:
-    """The control periods of a block, of which the last may end early."""
+@dataclass(frozen=True)
+class Columns:
+    """What consecutive control periods hold, by the names of ``ControlPeriod``; (n, N, ...)."""
 
-    first: int
-    """Number of the first period."""
-    reference: DesiredMotion
-    """Arrays of at least as many rows as will be recorded, without a vehicle axis."""
-    periods: list[ControlPeriod] = field(default_factory=list)
+    physics: Array
+    sensordata: Array
+    memory: dict[str, Array]
+    sensors: dict[str, Array]
+    measurement: dict[str, Array]
+    law: dict[str, Array]
+    command: dict[str, Array]
+    signals: dict[str, Array]
+    applied: tuple[Array, ...]
+    saturated: Array
+    wrench: Array | None
+    events: list[Event]
+    kinds: dict[str, type]
+    """The named tuples of "law", "command" and "signals"."""
 
-    def __len__(self) -> int:
-        """Return the number of periods."""
-        return len(self.periods)
 
-    def _column(self, name: str) -> list[Any]:
-        return list(map(attrgetter(name), self.periods))
+def columns_of(periods: Sequence[ControlPeriod]) -> Columns:
+    """Return the ``periods``, of which there is at least one, with a period axis."""
+    first = periods[0]
 
-    def block(
-        self,
-        assembly: Assembly,
-        layout: StateLayout,
-        effects: Sequence[StepEffect],
-        saturated_before: Array,
-    ) -> Block:
-        """Return the recorded periods as rows; ``saturated_before`` (N, m) holds before them."""
-        n, vehicle = len(self), assembly.vehicle
-        physics = np.array(self._column("physics"))
-        data = np.array(self._column("sensordata"))
-        reference = {name: a[:n, None] for name, a in self.reference._asdict().items()}
-        memory = _stacked(self._column("memory"))
-        truth = truth_of(physics, memory, layout, assembly.actuators, effects)
-        of_effects: dict[str, Array] = {}
-        for effect in effects:
-            of_effects |= effect.logged(memory, data)
-        state = {"physics": physics}
-        state |= {f"actuator_{name}": a for name, a in memory.items()}
-        state |= {f"law_{name}": a for name, a in _fields(self._column("law")).items()}
-        state |= {f"sensor_{name}": a for name, a in _stacked(self._column("sensors")).items()}
-        environment = data[..., vehicle.environment]
-        if self.periods[0].wrench is not None:
-            environment = environment + np.array(self._column("wrench"))
-        rows: Rows = {
-            "/state": state,
-            "/truth": {
-                **_without_empty(truth._asdict()),
-                **of_effects,
-                "position": physics[..., layout.position],
-                "velocity": physics[..., layout.velocity],
-                **_position_errors(physics[..., layout.position], truth.attitude, reference),
-                "momentum": data[..., vehicle.momentum],
-                "energy": data[..., vehicle.kinetic],
-                "attitude_error": attitude.rotation_angle(truth.attitude, reference["attitude"])[
-                    ..., None
-                ],
-            },
-            "/measurement": _measured(self._column("measurement")),
-            "/reference": {
-                name: np.broadcast_to(a, (n, physics.shape[1], a.shape[-1]))
-                for name, a in reference.items()
-            },
-            "/command": {
-                **_fields(self._column("command")),
-                **assembly.actuators.logged(self._column("applied")),
-            },
-            "/law": _fields(self._column("signals")),
-            "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
-        }
-        control = assembly.scenario.rates.control
-        time = (self.first + np.arange(n, dtype=float)) * control
-        events = _saturation_events(
-            time,
-            np.array(self._column("saturated"), bool),
-            saturated_before,
-            vehicle.motors,
-        )
-        events += [event for period in self.periods for event in period.events]
-        first = self.periods[0]
-        kinds = {
-            "/state": type(first.law),
-            "/reference": type(self.reference),
-            "/command": type(first.command),
-            "/law": type(first.signals),
-        }
-        return Block(self.first, time, {t: f for t, f in rows.items() if f}, events, kinds)
+    def column(name: str) -> list[Any]:
+        return list(map(attrgetter(name), periods))
+
+    return Columns(
+        physics=np.array(column("physics")),
+        sensordata=np.array(column("sensordata")),
+        memory=_stacked(column("memory")),
+        sensors=_stacked(column("sensors")),
+        measurement=_measured(column("measurement")),
+        law=_fields(column("law")),
+        command=_fields(column("command")),
+        signals=_fields(column("signals")),
+        applied=tuple(map(np.array, zip(*column("applied"), strict=True))),
+        saturated=np.array(column("saturated")),
+        wrench=None if first.wrench is None else np.array(column("wrench")),
+        events=[event for period in periods for event in period.events],
+        kinds={name: type(getattr(first, name)) for name in ("law", "command", "signals")},
+    )
+
+
+def block_of(
+    number: int,
+    reference: DesiredMotion,
+    columns: Columns,
+    assembly: Assembly,
+    layout: StateLayout,
+    effects: Sequence[StepEffect],
+    saturated_before: Array,
+) -> Block:
+    """Return the periods from ``number`` on as rows; ``saturated_before`` (N, m) holds before them.
+
+    ``reference`` has arrays of at least as many rows, without a vehicle axis.
+    """
+    physics, data, memory = columns.physics, columns.sensordata, columns.memory
+    n, vehicle = len(physics), assembly.vehicle
+    desired = {name: a[:n, None] for name, a in reference._asdict().items()}
+    truth = truth_of(physics, memory, layout, assembly.actuators, effects)
+    of_effects: dict[str, Array] = {}
+    for effect in effects:
+        of_effects |= effect.logged(memory, data)
+    state = {"physics": physics}
+    state |= {f"actuator_{name}": a for name, a in memory.items()}
+    state |= {f"law_{name}": a for name, a in columns.law.items()}
+    state |= {f"sensor_{name}": a for name, a in columns.sensors.items()}
+    environment = data[..., vehicle.environment]
+    if columns.wrench is not None:
+        environment = environment + columns.wrench
+    rows: Rows = {
+        "/state": state,
+        "/truth": {
+            **_without_empty(truth._asdict()),
+            **of_effects,
+            "position": physics[..., layout.position],
+            "velocity": physics[..., layout.velocity],
+            **_position_errors(physics[..., layout.position], truth.attitude, desired),
+            "momentum": data[..., vehicle.momentum],
+            "energy": data[..., vehicle.kinetic],
+            "attitude_error": attitude.rotation_angle(truth.attitude, desired["attitude"])[
+                ..., None
+            ],
+        },
+        "/measurement": columns.measurement,
+        "/reference": {
+            name: np.broadcast_to(a, (n, physics.shape[1], a.shape[-1]))
+            for name, a in desired.items()
+        },
+        "/command": {**columns.command, **assembly.actuators.logged(columns.applied)},
+        "/law": columns.signals,
+        "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
+    }
+    time = (number + np.arange(n, dtype=float)) * assembly.scenario.rates.control
+    saturated = columns.saturated.astype(bool)
+    events = _saturation_events(time, saturated, saturated_before, vehicle.motors)
+    kinds = {
+        "/state": columns.kinds["law"],
+        "/reference": type(reference),
+        "/command": columns.kinds["command"],
+        "/law": columns.kinds["signals"],
+    }
+    logged = {topic: fields for topic, fields in rows.items() if fields}
+    return Block(number, time, logged, events + columns.events, kinds)
 
 
 def _position_errors(

@@ -37,6 +37,22 @@ class UnbatchedLaw:
         after, commands, signals = zip(*flown, strict=True)
         return _stack("state", after), _stack("command", commands), _stack("signals", signals)
 
+    def step_of_one(
+        self, state: Any, time: Any, measurement: Measurement, reference: DesiredMotion
+    ) -> tuple[Any, Any, Any]:
+        """Return what ``step`` does, for arrays of one vehicle that may be traced."""
+        one = _vehicles(state)[0] if state else state
+        returned = self._law.step(one, time, measurement._map(lambda a: a[0]), reference)
+        check_step(returned)
+        after, command, signals = (_with_axis(part) if part else () for part in returned)
+        return after, command, signals
+
+
+def _with_axis(arrays: Any) -> Any:
+    """Return the named tuple with a vehicle axis before each field, as floats."""
+    floats = [a if hasattr(a, "astype") else np.asarray(a, dtype=float) for a in arrays]
+    return type(arrays)(*(each.astype(float)[None] for each in floats))
+
 
 def _measured(measurement: Measurement) -> list[Measurement]:
     """Return the measurement of each vehicle, without the vehicle axis."""

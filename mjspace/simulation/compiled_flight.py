@@ -1,0 +1,204 @@
+"""Blocks of control periods flown by compiled code, every vehicle on a thread of MuJoCo's batch."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from mjspace.contract import Array, DesiredMotion
+from mjspace.environment import struct_offsets
+from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.block_kernel import ORDERS, block_function
+from mjspace.simulation.compiled_period import CompiledPeriod, Copies, Recorded
+from mjspace.simulation.initial_state import INTEGRATION, Start
+from mjspace.simulation.native_batch import NativeBatch, address
+from mjspace.simulation.recording import Columns
+from mjspace.simulation.state_layout import StateLayout
+from mjspace.simulation.truth import truth_of
+
+_WORD = 8  # bytes
+
+
+class CompiledFlight:
+    """Vehicles that a compiled period flies.
+
+    Attributes:
+        physics: MuJoCo's integration state of each, (N, nstate).
+        memory: what the actuators remember, by name, (N, ...).
+        law: the law's state, a named tuple of arrays (N, ...), or empty.
+    """
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        layout: StateLayout,
+        period: CompiledPeriod,
+        start: Start,
+        threads: int,
+    ) -> None:
+        """Put them into a batch with the fields of MuJoCo's model of the ``start``."""
+        self._assembly, self._layout, self._period = assembly, layout, period
+        vehicles = len(start.physics)
+        self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model)
+        self._suite = assembly.sensors([0])
+        self.physics = self._batch.state
+        remembered = [*period.memory.values(), *period.law]
+        places, size = _packed(remembered)
+        self._rows = np.zeros((vehicles, size), np.uint8)
+        views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
+        count = len(period.memory)
+        self.memory = dict(zip(period.memory, views[:count], strict=True))
+        self.law = type(period.law)(*views[count:]) if period.law else ()
+        self._record_places, self._record_size = _packed(
+            [*(each.array for each in (*period.before, *period.after)), period.saturated]
+        )
+        self._tables: list[np.ndarray] = []
+        self._orders = self._constant_orders(remembered, places)
+
+    def set(self, physics: Array, memory: dict[str, Array], law: Any) -> None:
+        """Put the vehicles there, with what is remembered."""
+        self.physics[...] = physics
+        for name, values in memory.items():
+            self.memory[name][...] = values
+        for target, values in zip(self.law, law, strict=True):
+            target[...] = values
+
+    def fly(self, first: int, count: int, last: int, desired: DesiredMotion) -> Columns:
+        """Fly ``count`` periods from number ``first`` on; the flight's ``last`` is not flown.
+
+        ``desired`` has a row for each. A warning of MuJoCo's is left to be found in ``warned``.
+
+        Raises:
+            mujoco.batch.SimulationError: MuJoCo raised an error.
+        """
+        period, vehicles = self._period, len(self.physics)
+        records = np.empty((count, vehicles, self._record_size), np.uint8)
+        references = [np.ascontiguousarray(rows[:count]) for rows in desired]
+        inputs = _table(
+            (self._offset(to), of.ctypes.data, of.strides[0], of.strides[0])
+            for to, of in zip(period.reference, references, strict=True)
+        )
+        orders = self._orders
+        orders["first"], orders["count"], orders["last"] = first, count, last
+        orders["inputs"] = inputs.ctypes.data, len(inputs)
+        orders["record"] = records.ctypes.data
+        orders["period_stride"], orders["vehicle_stride"] = records.strides[:2]
+        self._batch.apply(block_function().address, orders.ctypes.data)
+        return self._columns(records)
+
+    @property
+    def warned(self) -> bool:
+        """Whether MuJoCo has warned of anything."""
+        return bool(self._batch.warning[:, :, 1].any())
+
+    def _columns(self, records: np.ndarray) -> Columns:
+        """Return what the ``records`` hold, (n, N, bytes), as views of them."""
+        period = self._period
+        groups: dict[str, dict[str, Array]] = {}
+        recorded = (*period.before, *period.after)
+        for place, each in zip(self._record_places, recorded, strict=False):
+            values = _view(records, place, each.array)
+            if values.size or each.group in ("memory", "applied"):
+                groups.setdefault(each.group, {})[each.name] = np.asarray(values, float)
+        physics, memory = groups["physics"][""], groups.get("memory", {})
+        truth = truth_of(physics, memory, self._layout, self._assembly.actuators, ())
+        _, measurement = self._suite.sample({}, 0, truth)
+        return Columns(
+            physics=physics,
+            sensordata=groups["sensordata"][""],
+            memory=memory,
+            sensors={},
+            measurement={n: a for n, a in measurement._asdict().items() if a.size},
+            law=groups.get("law", {}),
+            command=groups.get("command", {}),
+            signals=groups.get("signals", {}),
+            applied=tuple(groups.get("applied", {}).values()),
+            saturated=_view(records, self._record_places[-1], period.saturated),
+            wrench=None,
+            events=[],
+            kinds=period.kinds,
+        )
+
+    def _constant_orders(self, remembered: Sequence[np.ndarray], places: Sequence[int]) -> Any:
+        """Return the orders with all that is the same in every block."""
+        period, assembly = self._period, self._assembly
+        rates, model = assembly.scenario.rates, assembly.vehicle.model
+        _, words_of = struct_offsets.find()
+        orders = np.zeros((), ORDERS)
+        for name in ("step", "forward"):
+            orders[name] = address(f"mj_{name}")
+        orders["get_state"], orders["state"] = address("mj_getState"), int(INTEGRATION)
+        orders["steps"], orders["stepwise"] = rates.steps, assembly.driven_stepwise
+        orders["control"], orders["physics"] = rates.control, rates.physics
+        sensing, driving = period.sensing, period.driving
+        shifted = driving.table.copy()
+        shifted[:, 2:] += len(sensing.words)
+        drives = [kind.drives for kind in assembly.actuators.kinds]
+        tables = {
+            "memory": period.program.memory.view(np.int64),
+            "words": np.concatenate([sensing.words, driving.words]),
+            "relative": np.concatenate([sensing.relative, driving.relative]),
+            "sensing": sensing.table,
+            "driving": shifted,
+            "remembered": _table(
+                (self._offset(each), place, each.nbytes)
+                for each, place in zip(remembered, places, strict=True)
+            ),
+            "after_sensing": self._copies(period.after_sensing),
+            "after_driving": self._copies(period.after_driving),
+            "applied": _table(
+                (
+                    getattr(words_of, driven.array),
+                    _WORD * driven.slice_of(model).start,
+                    self._offset(values),
+                    values.nbytes,
+                )
+                for driven, values in zip(drives, period.applied, strict=True)
+            ),
+            "before": self._records(period.before, self._record_places),
+            "after": self._records(period.after, self._record_places[len(period.before) :]),
+        }
+        for name, table in tables.items():
+            table = np.ascontiguousarray(table)
+            self._tables.append(table)  # keeps alive what the orders point to
+            orders[name] = table.ctypes.data, len(table)
+        orders["row"], orders["row_stride"] = self._rows.ctypes.data, self._rows.strides[0]
+        orders["time"] = self._offset(period.time)
+        orders["state_row"] = self._offset(period.physics)
+        orders["saturated"] = self._offset(period.saturated), period.saturated.size
+        orders["saturated_record"] = self._record_places[-1]
+        orders["sensors"] = self._offset(period.sensordata)
+        orders["sensors_word"] = words_of.sensordata
+        orders["sensors_size"] = period.sensordata.nbytes
+        return orders
+
+    def _offset(self, array: np.ndarray) -> int:
+        return self._period.program.offset(array)
+
+    def _copies(self, pairs: Copies) -> np.ndarray:
+        return _table((self._offset(to), self._offset(of), to.nbytes) for to, of in pairs)
+
+    def _records(self, recorded: Sequence[Recorded], places: Sequence[int]) -> np.ndarray:
+        return _table(
+            (place, self._offset(each.array), each.array.nbytes)
+            for each, place in zip(recorded, places, strict=False)
+        )
+
+
+def _packed(arrays: Iterable[np.ndarray]) -> tuple[list[int], int]:
+    """Return where each array stands in a row of bytes, and the row's size."""
+    places, size = [], 0
+    for array in arrays:
+        places.append(size)
+        size += -(-array.nbytes // _WORD) * _WORD
+    return places, size
+
+
+def _view(rows: np.ndarray, place: int, array: np.ndarray) -> Any:
+    """Return the values like one vehicle's ``array`` (1, ...) at that place in the ``rows``."""
+    part = rows[..., place : place + array.nbytes]
+    return part.view(array.dtype).reshape(*rows.shape[:-1], *array.shape[1:])
+
+
+def _table(rows: Iterable[tuple[int, ...]]) -> np.ndarray:
+    return np.array(list(rows), np.int64)

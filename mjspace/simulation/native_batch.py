@@ -1,0 +1,117 @@
+"""MuJoCo's batch called through its C interface, for compiled functions that fly whole blocks.
+
+``mujoco.batch.Batch`` steps from Python. ``mjb_apply`` of the C interface runs a C function on each
+simulation, on the batch's threads, with MuJoCo's errors caught; Python has no method for it.
+"""
+
+import ctypes
+import functools
+import weakref
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import SimulationError
+
+from mjspace.contract import Array
+
+_ERROR_LENGTH = 1000
+
+
+class _Config(ctypes.Structure):
+    """``mjBatchConfig``."""
+
+    _fields_ = (("nthread", ctypes.c_int), ("persistent", ctypes.c_bool))
+
+
+@functools.cache
+def library() -> ctypes.CDLL:
+    """Return the library that the mujoco package has loaded."""
+    (path,) = Path(mujoco.__file__).parent.glob(_library_name())
+    loaded = ctypes.CDLL(str(path))
+    pointer, text, count = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int
+    for name, result, arguments in (
+        ("mjb_makeBatch", pointer, [pointer, count, pointer, text, count]),
+        ("mjb_deleteBatch", None, [pointer]),
+        ("mjb_state", pointer, [pointer]),
+        ("mjb_warning", pointer, [pointer]),
+        ("mjb_expand", pointer, [pointer, text, pointer, pointer]),
+        ("mjb_setConst", count, [pointer, pointer, count]),
+        ("mjb_apply", count, [pointer, pointer, count, pointer, pointer, count]),
+        ("mjb_status", pointer, [pointer]),
+        ("mjb_error", text, [pointer, count]),
+    ):
+        function = getattr(loaded, name)
+        function.restype, function.argtypes = result, arguments
+    return loaded
+
+
+def _library_name() -> str:
+    return {"Windows": "mujoco.dll", "Darwin": "libmujoco*.dylib"}.get(
+        __import__("platform").system(), "libmujoco.so*"
+    )
+
+
+def address(function: str) -> int:
+    """Return where MuJoCo's C ``function`` is."""
+    return ctypes.cast(getattr(library(), function), ctypes.c_void_p).value or 0
+
+
+class NativeBatch:
+    """Simulations of a copy of ``model``, as ``mujoco.batch.Batch`` has them.
+
+    Attributes:
+        state: each simulation's integration state, (N, nstate): written and read between calls.
+        warning: each simulation's warning counters, (N, mjNWARNING, 2), int32.
+    """
+
+    def __init__(
+        self, model: Any, vehicles: int, threads: int, fields: Mapping[str, Array]
+    ) -> None:
+        """Make it; ``fields`` of the model differ between vehicles, (N, ...).
+
+        Raises:
+            ValueError: MuJoCo cannot make it.
+        """
+        message = ctypes.create_string_buffer(_ERROR_LENGTH)
+        config = _Config(threads, False)
+        self._batch = library().mjb_makeBatch(
+            model._address, vehicles, ctypes.byref(config), message, _ERROR_LENGTH
+        )
+        if not self._batch:
+            raise ValueError(message.value.decode(errors="replace"))
+        weakref.finalize(self, library().mjb_deleteBatch, self._batch)
+        self.vehicles = vehicles
+        size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
+        rows = library().mjb_state(self._batch)
+        self.state = self._array(rows, ctypes.c_double, (vehicles, size))
+        counters = (vehicles, int(mujoco.mjtWarning.mjNWARNING), 2)
+        self.warning = self._array(library().mjb_warning(self._batch), ctypes.c_int, counters)
+        for name, values in fields.items():
+            at = library().mjb_expand(self._batch, name.encode(), None, None)
+            self._array(at, ctypes.c_double, values.shape)[...] = values
+        if fields:
+            self._check(library().mjb_setConst(self._batch, None, 0))
+
+    def apply(self, function: int, argument: int) -> None:
+        """Call the C ``function`` at that address on each simulation, then save its state.
+
+        Raises:
+            mujoco.batch.SimulationError: MuJoCo raised an error in some simulations.
+        """
+        self._check(library().mjb_apply(self._batch, None, 0, function, argument, 1))
+
+    def _check(self, failed: int) -> None:
+        if failed:
+            status = self._array(library().mjb_status(self._batch), ctypes.c_int, (self.vehicles,))
+            which = np.flatnonzero(status)
+            message = library().mjb_error(self._batch, int(which[0]))
+            raise SimulationError(which, message.decode(errors="replace"), self.vehicles)
+
+    def _array(self, at: int, kind: Any, shape: tuple[int, ...]) -> np.ndarray:
+        """Return MuJoCo's memory as an array, which keeps this batch alive."""
+        memory = (kind * int(np.prod(shape))).from_address(at)
+        memory.owner = self
+        return np.ctypeslib.as_array(memory).reshape(shape)

@@ -1,0 +1,195 @@
+"""A program: calls of inner loops in order, and the memory that they work on.
+
+All operands lie in one memory, and a call knows them by their offsets in it. A copy of the memory,
+wherever it lies, is another instance of the program: each thread has its own.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from mjspace.tracing.inner_loops import Untraceable, inner_loop
+
+MEMORY = 1 << 20
+"""Size of a program's memory while it is taken down [bytes]."""
+_BOOL, _FLOAT = np.dtype(bool), np.dtype(float)
+
+
+@dataclass(frozen=True)
+class Calls:
+    """Calls of inner loops in order, as compiled code reads them.
+
+    A row of ``table`` is (address of the loop, its data, and where in ``words`` its operands, its
+    dimensions and its steps begin). ``words`` that ``relative`` marks are offsets in the memory.
+    """
+
+    table: np.ndarray
+    """(calls, 5), int64."""
+    words: np.ndarray
+    """(n,), int64."""
+    relative: np.ndarray
+    """(n,), int64: 1 or 0."""
+
+
+@dataclass
+class _Section:
+    calls: list[tuple[int, int, int, int, int]] = field(default_factory=list)
+    words: list[int] = field(default_factory=list)
+    relative: list[int] = field(default_factory=list)
+
+    def finished(self) -> Calls:
+        table = np.array(self.calls, np.int64).reshape(-1, 5)
+        return Calls(table, np.array(self.words, np.int64), np.array(self.relative, np.int64))
+
+
+class Program:
+    """The memory, and the calls of the section that is being taken down."""
+
+    def __init__(self) -> None:
+        self._memory = np.zeros(MEMORY // 8).view(np.uint8)
+        self._used = 0
+        self._section: _Section | None = None
+
+    @contextmanager
+    def section(self) -> Iterator[list[Calls]]:
+        """Take down calls until the end of the context; the list then holds them."""
+        taken: list[Calls] = []
+        self._section = _Section()
+        try:
+            yield taken
+            taken.append(self._section.finished())
+        finally:
+            self._section = None
+
+    @property
+    def memory(self) -> np.ndarray:
+        """Return the memory in use, (bytes,) of uint8: a view."""
+        return self._memory[: self._used]
+
+    def place(self, shape: tuple[int, ...], kind: np.dtype[Any] = _FLOAT) -> np.ndarray:
+        """Return an array of zeros in the memory, float64 or bool.
+
+        Raises:
+            Untraceable: of another kind, or the memory is full.
+        """
+        if kind not in (_BOOL, _FLOAT):
+            raise Untraceable(f"an array of {kind}")
+        size = prod(shape) * kind.itemsize
+        if self._used + size > MEMORY:
+            raise Untraceable(f"more than {MEMORY} bytes of arrays")
+        array: np.ndarray = self._memory[self._used : self._used + size].view(kind).reshape(shape)
+        self._used += -(-size // 8) * 8
+        return array
+
+    def copied(self, values: Any) -> np.ndarray:
+        """Return a copy of ``values`` in the memory."""
+        values = np.asarray(values)
+        array = self.place(values.shape, _BOOL if values.dtype == _BOOL else _FLOAT)
+        array[...] = values
+        return array
+
+    def holds(self, array: np.ndarray) -> bool:
+        """Return whether the ``array`` is a view of the memory."""
+        return 0 <= self._offset(array) < MEMORY
+
+    def offset(self, array: np.ndarray) -> int:
+        """Return where an ``array`` of the memory begins [bytes]."""
+        assert self.holds(array)
+        return self._offset(array)
+
+    def at(
+        self, offset: int, shape: tuple[int, ...], strides: tuple[int, ...], kind: np.dtype[Any]
+    ) -> np.ndarray:
+        """Return the array of that ``kind`` that begins at ``offset``, with ``strides`` [bytes]."""
+        return np.ndarray(shape, kind, self._memory, offset, strides)
+
+    def apply(self, ufunc: np.ufunc, operands: Sequence[np.ndarray]) -> None:
+        """Take down a call on arrays of the memory, broadcast to the shape of the last."""
+        shape = operands[-1].shape
+        views = [np.broadcast_to(each, shape) for each in operands]
+        for lead, (length, *steps) in _runs(views):
+            self._call(ufunc, lead, (length,), steps)
+
+    def apply_core(self, ufunc: np.ufunc, signature: str, operands: Sequence[np.ndarray]) -> None:
+        """Take down a call of a generalized ufunc, whose ``signature`` names its core dimensions.
+
+        The last operand has all of the outer dimensions.
+        """
+        cores = [
+            [name for name in part.split(",") if name]
+            for part in signature.replace(" ", "").replace("->", ",")[1:-1].split("),(")
+        ]
+        sizes: dict[str, int] = {}
+        for each, core in zip(operands, cores, strict=True):
+            for name, size in zip(core, each.shape[each.ndim - len(core) :], strict=True):
+                sizes.setdefault(name, size)
+        outer = operands[-1].shape[: operands[-1].ndim - len(cores[-1])]
+        whole = [
+            np.broadcast_to(each, outer + each.shape[each.ndim - len(core) :])
+            for each, core in zip(operands, cores, strict=True)
+        ]
+        for index in np.ndindex(*outer):
+            views = [each[(*index, ...)] for each in whole]
+            steps = [0] * len(views) + [step for view in views for step in view.strides]
+            self._call(ufunc, views, (1, *sizes.values()), steps)
+
+    def reduce(self, ufunc: np.ufunc, source: np.ndarray, target: np.ndarray) -> None:
+        """Take down the reduction of the last axis of ``source`` into ``target``, (...)."""
+        for index in np.ndindex(*target.shape):
+            result, row = target[(*index, ...)], source[(*index, ...)]
+            self._call(ufunc, [result, row, result], (len(row),), [0, *row.strides, 0])
+
+    def copy(self, source: np.ndarray, target: np.ndarray) -> None:
+        """Take down a copy between arrays of the memory of the same kind."""
+        if target.dtype == _BOOL:
+            self.apply(np.logical_or, [source, source, target])
+        else:
+            self.apply(np.positive, [source, target])
+
+    def _call(
+        self,
+        ufunc: np.ufunc,
+        operands: Sequence[np.ndarray],
+        dimensions: Sequence[int],
+        steps: Sequence[int],
+    ) -> None:
+        if self._section is None:
+            raise Untraceable("an array kept from an earlier call")
+        loop = inner_loop(ufunc, tuple(each.dtype for each in operands))
+        section = self._section
+        first = len(section.words)
+        section.words += [*map(self.offset, operands), *dimensions, *steps]
+        section.relative += [1] * len(operands) + [0] * (len(dimensions) + len(steps))
+        at = first + len(operands)
+        section.calls.append((loop.address, loop.data, first, at, at + len(dimensions)))
+
+    def _offset(self, array: np.ndarray) -> int:
+        return int(array.ctypes.data) - int(self._memory.ctypes.data)
+
+
+def _runs(views: Sequence[np.ndarray]) -> Iterator[tuple[list[np.ndarray], tuple[int, ...]]]:
+    """Yield (arrays of the first elements, (length, step of each)) of as long runs as there are.
+
+    ``views`` have one shape. Axes along which every view goes on with one step are one run.
+    """
+    shape = views[0].shape
+    if 0 in shape:
+        return
+    axis, length = len(shape), 1
+    steps = [0] * len(views)
+    while axis:
+        strides = [view.strides[axis - 1] for view in views]
+        if shape[axis - 1] != 1:
+            if length > 1 and any(s != length * step for s, step in zip(strides, steps, strict=True)):
+                break
+            if length == 1:
+                steps = strides
+            length *= shape[axis - 1]
+        axis -= 1
+    for index in np.ndindex(*shape[:axis]):
+        firsts = [view[(*index, ..., *[slice(0, 1)] * (len(shape) - axis))] for view in views]
+        yield firsts, (length, *steps)
