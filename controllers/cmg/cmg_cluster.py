@@ -88,7 +88,7 @@ class CmgCluster(Gains):
             self._attitude_gains,
         )
         rate, measure, damping = cmg_steering.steer(
-            self._cluster, torque, angle, speed, np.array([time]), self._steering_gains
+            self._cluster, torque, angle, speed, np.atleast_1d(time), self._steering_gains
         )
         fastest = np.max(np.abs(rate), axis=-1, keepdims=True)
         rate = rate / np.maximum(fastest / self.gimbal_rate_limit, 1.0)

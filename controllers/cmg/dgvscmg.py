@@ -188,7 +188,7 @@ class Cascade(Gains):
         """Return the motors' voltages for the desired speeds."""
         speed = _speeds(measurement)
         memory, wheel_speed = state.speed_memory, state.wheel_wanted
-        if round(time / self.inner_period) % self.speed_steps == 0:
+        if self.speed_steps == 1 or round(time / self.inner_period) % self.speed_steps == 0:
             memory, _ = self._speed_loop.step(
                 memory,
                 measurement.current,

@@ -21,6 +21,7 @@ def apply(program: Program, function: Any, args: tuple[Any, ...], kwargs: dict[s
     """
     if function in _MOVES:
         data, *others = args
+        _refuse_measured(program, function, *others, *kwargs.values())
         return move(program, lambda array: function(array, *others, **kwargs), data)
     if function in _REDUCTIONS:
         return _reduced(program, _REDUCTIONS[function], *args, **kwargs)
@@ -159,6 +160,14 @@ def _mean(program: Program, array: np.ndarray, axis: Any = None, *, keepdims: bo
     return _call(program, np.true_divide, total, array.size / max(total.size, 1))
 
 
+def _sinc(program: Program, array: Any) -> Any:
+    # As NumPy computes it.
+    x = _call(program, np.multiply, np.pi, array)
+    zero = _call(program, np.equal, x, 0.0)
+    y = ufuncs.select(program, zero, np.finfo(float).eps, x)
+    return _call(program, np.true_divide, _call(program, np.sin, y), y)
+
+
 def _where(program: Program, condition: Any, *choices: Any) -> np.ndarray:
     if len(choices) != 2:
         raise Untraceable("np.where with a condition alone")
@@ -168,8 +177,16 @@ def _where(program: Program, condition: Any, *choices: Any) -> np.ndarray:
 def _full_like(program: Program, array: Any, value: Any, dtype: Any = None) -> np.ndarray:
     if dtype not in (None, float):
         raise Untraceable(f"an array like another, of {dtype}")
-    constant = program.copied(np.full_like(array, value))
-    return copy(program, constant)  # anew in each run: it may be written to
+    target = program.copied(np.full_like(array, value, dtype=float))
+    source = ufuncs.in_memory(program, value, _FLOAT)
+    program.copy(np.broadcast_to(source, target.shape), target)  # in each run: it may be written to
+    return target
+
+
+def _refuse_measured(program: Program, function: Any, *options: Any) -> None:
+    """Refuse options that are measured: which elements are moved would be frozen."""
+    if any(isinstance(each, np.ndarray) and program.holds(each) for each in options):
+        raise Untraceable(f"np.{function.__name__} with a measured option")
 
 
 def _shape_of(value: Any) -> Any:
@@ -200,6 +217,7 @@ _OWN: dict[Any, Callable[..., Any]] = {
     np.linalg.norm: _norm,
     np.mean: _mean,
     np.ones_like: lambda program, array, **options: _full_like(program, array, 1.0, **options),
+    np.sinc: _sinc,
     np.where: _where,
     np.zeros_like: lambda program, array, **options: _full_like(program, array, 0.0, **options),
 }

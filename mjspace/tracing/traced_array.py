@@ -62,10 +62,12 @@ class TracedArray(NDArrayOperatorsMixin):
         return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: Any) -> Any:
-        return self._applied(functions.move, lambda array: array[_plain(index)], self)
+        _refuse_traced(index)
+        return self._applied(functions.move, lambda array: array[index], self)
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        self._applied(functions.assign, self, _plain(index), value)
+        _refuse_traced(index)
+        self._applied(functions.assign, self, index, value)
 
     def __pow__(self, exponent: Any) -> Any:
         # An array's own shortcuts, which differ from np.power in the last digit.
@@ -117,6 +119,13 @@ class TracedArray(NDArrayOperatorsMixin):
 
     __bool__ = __float__ = __int__ = __index__ = __complex__ = __round__ = __array__ = _number
     item = tolist = _number
+
+
+def _refuse_traced(index: Any) -> None:
+    """Refuse an index that is measured: where it points would be frozen."""
+    parts = index if isinstance(index, tuple) else (index,)
+    if any(isinstance(part, TracedArray) for part in parts):
+        raise Untraceable("an index that is measured")
 
 
 def _plain(value: Any) -> Any:
