@@ -6,6 +6,7 @@ import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.tracing.program import Calls
@@ -14,8 +15,7 @@ _BYTE, _WORD = ir.IntType(8), ir.IntType(64)
 _POINTER = _BYTE.as_pointer()
 
 
-@intrinsic
-def call_loop(
+def _generate_call(
     context: Any, loop: Any, operands: Any, dimensions: Any, steps: Any, data: Any
 ) -> Any:
     """Call ``void loop(char** operands, npy_intp* dimensions, npy_intp* steps, void* data)``."""
@@ -29,8 +29,7 @@ def call_loop(
     return types.void(*[types.int64] * 5), generate
 
 
-@intrinsic
-def copy_bytes(context: Any, target: Any, source: Any, size: Any) -> Any:
+def _generate_copy(context: Any, target: Any, source: Any, size: Any) -> Any:
     """Copy ``size`` bytes between addresses that do not overlap."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -40,6 +39,10 @@ def copy_bytes(context: Any, target: Any, source: Any, size: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(*[types.int64] * 3), generate
+
+
+call_loop: Any = intrinsic(_generate_call)
+copy_bytes: Any = intrinsic(_generate_copy)
 
 
 @njit
@@ -65,7 +68,7 @@ def run(table: Any, words: Any) -> None:
         )
 
 
-def prove(calls: Calls, memory: np.ndarray) -> None:
+def prove(calls: Calls, memory: NDArray[Any]) -> None:
     """Run the ``calls`` on a copy of the ``memory`` in which they were taken down.
 
     Raises:
