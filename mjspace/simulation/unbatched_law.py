@@ -18,7 +18,8 @@ class UnbatchedLaw:
 
     def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
         """Return the law's state with a vehicle axis."""
-        states = [self._law.reset(one, reference) for one in _measured(measurement)]
+        vehicles = range(len(measurement.rate))
+        states = [self._law.reset(_of_vehicle(measurement, v), reference) for v in vehicles]
         for state in states:
             check_state(state)
         return _stack("state", states)
@@ -27,13 +28,9 @@ class UnbatchedLaw:
         self, state: Any, time: float, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
         """Return the law's state, command and signals with a vehicle axis."""
-        states = _vehicles(state) if state else [state] * len(measurement.rate)
         flown = [
-            self._law.step(s, time, m, reference)
-            for s, m in zip(states, _measured(measurement), strict=True)
+            self._step(v, state, time, measurement, reference) for v in range(len(measurement.rate))
         ]
-        for returned in flown:
-            check_step(returned)
         after, commands, signals = zip(*flown, strict=True)
         return _stack("state", after), _stack("command", commands), _stack("signals", signals)
 
@@ -41,28 +38,28 @@ class UnbatchedLaw:
         self, state: Any, time: Any, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
         """Return what ``step`` does, for arrays of one vehicle that may be traced."""
-        one = _vehicles(state)[0] if state else state
-        returned = self._law.step(one, time, measurement._map(lambda a: a[0]), reference)
-        check_step(returned)
+        returned = self._step(0, state, time, measurement, reference)
         after, command, signals = (_with_axis(part) if part else () for part in returned)
         return after, command, signals
+
+    def _step(
+        self, vehicle: int, state: Any, time: Any, measurement: Measurement, reference: Any
+    ) -> tuple[Any, Any, Any]:
+        """Return what the law returns for that vehicle."""
+        own = type(state)(*(field[vehicle] for field in state)) if state else state
+        returned = self._law.step(own, time, _of_vehicle(measurement, vehicle), reference)
+        check_step(returned)
+        return returned
+
+
+def _of_vehicle(measurement: Measurement, vehicle: int) -> Measurement:
+    return measurement._map(lambda array: array[vehicle])
 
 
 def _with_axis(arrays: Any) -> Any:
     """Return the named tuple with a vehicle axis before each field, as floats."""
     floats = [a if hasattr(a, "astype") else np.asarray(a, dtype=float) for a in arrays]
     return type(arrays)(*(each.astype(float)[None] for each in floats))
-
-
-def _measured(measurement: Measurement) -> list[Measurement]:
-    """Return the measurement of each vehicle, without the vehicle axis."""
-    kind, names = type(measurement), measurement._fields
-    rows = zip(*measurement._asdict().values(), strict=True)
-    return [kind(**dict(zip(names, row, strict=True))) for row in rows]
-
-
-def _vehicles(arrays: Any) -> list[Any]:
-    return [type(arrays)(*row) for row in zip(*arrays, strict=True)]
 
 
 def _stack(name: str, tuples: Sequence[Any]) -> Any:

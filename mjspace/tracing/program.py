@@ -184,7 +184,9 @@ def _runs(views: Sequence[np.ndarray]) -> Iterator[tuple[list[np.ndarray], tuple
     while axis:
         strides = [view.strides[axis - 1] for view in views]
         if shape[axis - 1] != 1:
-            if length > 1 and any(s != length * step for s, step in zip(strides, steps, strict=True)):
+            if length > 1 and any(
+                s != length * step for s, step in zip(strides, steps, strict=True)
+            ):
                 break
             if length == 1:
                 steps = strides

@@ -52,7 +52,8 @@ class TracedArray(NDArrayOperatorsMixin):
         return self.array.dtype
 
     @property
-    def T(self) -> "TracedArray":
+    def T(self) -> "TracedArray":  # noqa: N802 - an array's name for it
+        """Return the transposed, as an array does."""
         return TracedArray(self.array.T, self.program)
 
     def __len__(self) -> int:

@@ -180,7 +180,7 @@ def test_a_reference_cannot_change_what_it_has_returned(tmp_path: Path) -> None:
         + """
 class Source:
     def __init__(self):
-        self.rows = np.zeros((1000, 3))
+        self.rows = np.zeros((9000, 3))
     def at(self, time):
         n = len(time)
         self.rows += 1.0
