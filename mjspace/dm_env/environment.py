@@ -38,10 +38,9 @@ def load(scenario: str | Path, overrides: Iterable[str] = ()) -> Any:
     """Return the ``dm_control.rl.control.Environment`` of a scenario, by name or path.
 
     ``overrides`` are ``"key=value"``, as ``--set`` takes them. Every episode is the same flight,
-    that of member 0, on the stepper of a flight: the commands that a flight logged, sent as actions,
+    that of member 0, on the stepper of a flight: the commands that a flight logged, as actions,
     leave bit for bit the ``/state`` of that flight. An action takes the place of the law and of its
-    inner loop, whose commands act once in a control period then. Another ``seed`` gives other
-    noise.
+    inner loop, and is held for one control period. Another ``seed`` gives other noise.
 
     Raises:
         InputError: bad input, in one line.
