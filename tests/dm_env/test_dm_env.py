@@ -135,6 +135,7 @@ def observed(built: Assembly, step: TimeStep) -> tuple[Measurement, Any]:
 
 def by_law(built: Assembly) -> Fly:
     """Return what commands as the scenario's law does; its inner loop at equal rates alone."""
+    law: Any = built.law
     memory = None
 
     def fly(step: TimeStep, number: int) -> Any:
@@ -142,10 +143,10 @@ def by_law(built: Assembly) -> Fly:
         time = number * built.scenario.rates.control
         measurement, reference = observed(built, step)
         if step.first():
-            memory = built.law.reset(measurement, reference)
-        memory, command, _ = built.law.step(memory, time, measurement, reference)
+            memory = law.reset(measurement, reference)
+        memory, command, _ = law.step(memory, time, measurement, reference)
         if built.inner:
-            memory, command = built.law.inner(memory, time, command, measurement)
+            memory, command = law.inner(memory, time, command, measurement)
         return command
 
     return fly
@@ -153,7 +154,7 @@ def by_law(built: Assembly) -> Fly:
 
 def by_log(blocks: list[Block]) -> Fly:
     """Return what commands as a flight has logged."""
-    kind = blocks[0].kinds["/command"]
+    kind: Any = blocks[0].kinds["/command"]
     columns = {name: joined(blocks, "/command", name) for name in kind._fields}
 
     def fly(step: TimeStep, number: int) -> Any:
