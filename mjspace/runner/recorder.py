@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import mujoco
 import numpy as np
@@ -93,13 +92,8 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._log.__exit__(kind, error, trace)
+    def __exit__(self, *raised: Any) -> None:
+        self._log.__exit__(*raised)
 
     def _write_frames(self, block: Block, physics: np.ndarray) -> None:
         due = np.flatnonzero((block.period + np.arange(len(block.time))) % self._stride == 0)
