@@ -52,7 +52,7 @@ def test_the_wheel_s_wanted_speed_is_the_integral_of_what_the_steering_wants() -
         + carried(measurement.rate, measurement.gimbal_angle, measurement.gimbal_rate)[..., 2:]
     )
     wanted = with_carrier + 3e-4 * command.acceleration[:, 2:]
-    np.testing.assert_allclose(state.wheel_wanted, wanted, rtol=1e-14)
+    np.testing.assert_allclose(state.desired_wheel_speed, wanted, rtol=1e-14)
 
 
 def test_a_slower_speed_loop_holds_the_currents_that_it_wants() -> None:
@@ -67,7 +67,7 @@ def test_a_slower_speed_loop_holds_the_currents_that_it_wants() -> None:
         changed.append(np.any(state.speed_memory != before.speed_memory))
         assert np.any(state.voltage_integral != before.voltage_integral)
     assert np.flatnonzero(changed).tolist() == [0, 5, 10]
-    gained = state.wheel_wanted - law.reset(measurement, AT_REST).wheel_wanted
+    gained = state.desired_wheel_speed - law.reset(measurement, AT_REST).desired_wheel_speed
     np.testing.assert_allclose(gained, 1.5e-3 * command.acceleration[:, 2:], rtol=1e-11)
 
 

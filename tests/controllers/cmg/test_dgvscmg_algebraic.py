@@ -65,13 +65,13 @@ def test_the_bus_gets_what_the_wheel_s_momentum_loses() -> None:
     for (before, _), (after, torque) in zip(steps[-9:], steps[-8:], strict=False):
         loss = (momentum(before) - momentum(after)) / INNER
         # The midpoint rule's third order, with gimbal rates of some rad/s.
-        np.testing.assert_allclose(after.given, loss, atol=1e-5)
+        np.testing.assert_allclose(after.applied_torque, loss, atol=1e-5)
         # And it turns with the bus: h x w on the side of the bus.
         halfway = 0.5 * (momentum(before) + momentum(after))
         np.testing.assert_allclose(
-            torque - after.given, np.cross(halfway, measurement.rate), atol=1e-5
+            torque - after.applied_torque, np.cross(halfway, measurement.rate), atol=1e-5
         )
-    assert np.abs(steps[-1][0].given).max() > 0.1
+    assert np.abs(steps[-1][0].applied_torque).max() > 0.1
 
 
 def test_a_motor_turns_under_its_current_and_the_vibration() -> None:
@@ -107,14 +107,14 @@ def test_gimbals_take_up_their_wanted_rates_as_printed_and_then_keep_to_them() -
     measurement = seen(1)
     flying = law()
     state = flying.reset(measurement, wanted())
-    error = [state.wanted[0, :2] - state.speed[0, :2]]
+    error = [state.desired_speed[0, :2] - state.speed[0, :2]]
     for period in range(200):
         state, command, _ = flying.step(state, period * PERIOD, measurement, wanted())
         for inner in range(10):
             state, _ = flying.inner(state, period * PERIOD + inner * INNER, command, measurement)
         # A wanted rate is reached at the end of the period in which it was asked.
-        np.testing.assert_allclose(state.wanted[:, :2], command.gimbal_rate, rtol=1e-12)
-        error.append(state.wanted[0, :2] - state.speed[0, :2])
+        np.testing.assert_allclose(state.desired_speed[:, :2], command.gimbal_rate, rtol=1e-12)
+        error.append(state.desired_speed[0, :2] - state.speed[0, :2])
     assert np.abs(error[0]).min() > 0.1
     # J e' = -k_p e, at 1.5 1/s, whatever is wanted meanwhile: Euler's rule in steps of 0.1 ms.
     np.testing.assert_allclose(error[-1] / error[0], (1.0 - 1.5e-4) ** 2000, rtol=1e-9)
