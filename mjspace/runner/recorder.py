@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from types import TracebackType
+from typing import Self
 
 import mujoco
 import numpy as np
@@ -92,8 +93,13 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *raised: Any) -> None:
-        self._log.__exit__(*raised)
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._log.__exit__(kind, error, trace)
 
     def _write_frames(self, block: Block, physics: np.ndarray) -> None:
         due = np.flatnonzero((block.period + np.arange(len(block.time))) % self._stride == 0)
