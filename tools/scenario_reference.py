@@ -13,7 +13,7 @@ from annotated_types import MaxLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from mjspace.scenario.construct import controllers
+from mjspace.scenario.construct import controllers, table_of
 from mjspace.scenario.declared import DeclaredIn, tables_in, type_of
 from mjspace.scenario.fields import Si
 from mjspace.scenario.scenario import Scenario
@@ -89,7 +89,11 @@ They all go into the log, from which the flight is replayed without the folder."
 
 
 def _gain(field: Field[Any]) -> str:
-    words = [field.metadata.get(key, "") for key in ("unit", "range", "form")]
+    if (table := table_of(field.type)) is not None:
+        return f"`{field.name}` (table: {', '.join(map(_gain, fields(table)))})"
+    unit = field.metadata.get("unit", "")
+    words = ["any unit" if unit is None else unit]
+    words += [field.metadata.get(key, "") for key in ("range", "form")]
     stated = ", ".join(str(word) for word in words if str(word)).replace("|", "\\|")
     unit = f" ({stated})" if stated else ""
     if field.default_factory is not MISSING:

@@ -99,7 +99,7 @@ class ActuatorSet:
             saturated.append(cut)
         return state, tuple(applied), np.concatenate(saturated, axis=-1)
 
-    def seen(self, state: State, truth: Measurement) -> Measurement:
+    def measured(self, state: State, truth: Measurement) -> Measurement:
         """Return the truth with what the actuators' own sensors measure."""
         for kind in self.kinds:
             truth = _of(kind, kind.measured, state, truth)

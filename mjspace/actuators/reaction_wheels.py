@@ -76,7 +76,8 @@ class Wheels(ActuatorTable, Bearing):
         centres = np.zeros_like(axes) if self.positions is None else np.array(self.positions)
         half = self.inertia / 2.0
         transverse = half if self.transverse_inertia is None else self.transverse_inertia
-        return mass_properties.Rotors(axes, centres, self.mass, self.inertia, transverse)
+        limit = self.speed_limit or inf
+        return mass_properties.Rotors(axes, centres, self.mass, self.inertia, transverse, limit)
 
     def attach(self, spec: Any) -> None:
         """Bolt each wheel to the bus, its z axis along the spin axis."""

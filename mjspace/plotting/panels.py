@@ -1,8 +1,7 @@
 """The panels of a page: one for each signal that has something to show."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +26,7 @@ class Panel:
     topic: str
     field: str
     quantity: Unit = NO_UNIT
+    """Of the field, as the log has it; ``read`` fills it in."""
     part: slice | None = None
     """The one component that is drawn; all when left out."""
     names: str = ""
@@ -59,21 +59,17 @@ class Curves:
     desired: Array | None = None
 
 
-def _standard(title: str, topic: str, field: str, **drawn: Any) -> Panel:
-    return Panel(title, topic, field, DECLARED[topic][field], **drawn)
-
-
 STANDARD = (
-    _standard("Attitude error", "/truth", "attitude_error", log_scale=True),
-    _standard("Body rate", "/truth", "rate", names="xyz", desired=DESIRED_RATE),
-    _standard("Commanded torque on the bus", "/command", "torque", names="xyz"),
-    _standard("Wheel motor torque", "/command", "wheel_torque"),
-    _standard("Motor torque", "/command", "motor_torque"),
-    _standard("Gimbal angle", "/truth", "gimbal_angle"),
-    _standard("Gimbal rate", "/truth", "gimbal_rate", desired=("/command", "gimbal_rate")),
-    _standard("Wheel speed", "/truth", "wheel_speed"),
-    _standard("Change of total momentum", "/truth", "momentum", log_scale=True, drift=True),
-    _standard("Disturbance torque about the centre of mass", "/disturbance", "torque", names="xyz"),
+    Panel("Attitude error", "/truth", "attitude_error", log_scale=True),
+    Panel("Body rate", "/truth", "rate", names="xyz", desired=DESIRED_RATE),
+    Panel("Commanded torque on the bus", "/command", "torque", names="xyz"),
+    Panel("Wheel motor torque", "/command", "wheel_torque"),
+    Panel("Motor torque", "/command", "motor_torque"),
+    Panel("Gimbal angle", "/truth", "gimbal_angle"),
+    Panel("Gimbal rate", "/truth", "gimbal_rate", desired=("/command", "gimbal_rate")),
+    Panel("Wheel speed", "/truth", "wheel_speed"),
+    Panel("Change of total momentum", "/truth", "momentum", log_scale=True, drift=True),
+    Panel("Disturbance torque about the centre of mass", "/disturbance", "torque", names="xyz"),
 )
 
 
@@ -106,7 +102,8 @@ def chosen(log: Log, signals: Sequence[str]) -> Iterator[Curves]:
 
 
 def read(log: Log, panel: Panel) -> Curves:
-    """Return the panel's curves from the log."""
+    """Return the panel's curves, in the unit that the log has for its field."""
+    panel = replace(panel, quantity=unit(log, panel.topic, panel.field))
     first: list[Array] = []
 
     def change(rows: Array) -> Array:
@@ -125,12 +122,12 @@ def read(log: Log, panel: Panel) -> Curves:
 
 def unit(log: Log, topic: str, field: str) -> Unit:
     """Return the unit that a logged field has, and how it is displayed if that is declared."""
-    si = log.units.get(topic, {}).get(field, "")
     declared = DECLARED.get(topic, {}).get(field, NO_UNIT)
+    si = log.units.get(topic, {}).get(field, declared.si)
     return declared if declared.si == si else Unit(si)
 
 
 def _of_signal(log: Log, signal: str) -> Panel:
     topic, field, part = find_signal(log.topics, signal)
     title = f"Law: {signal.removeprefix('law.')}" if topic == "/law" else signal
-    return Panel(title, topic, field, unit(log, topic, field), part=part)
+    return Panel(title, topic, field, part=part)

@@ -16,6 +16,7 @@ from mjspace.contract import REPORTED_BY_PLANT
 from mjspace.errors import InputError, input_error_at
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.runner.former_names import as_logged, logged_name
 from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
@@ -108,7 +109,7 @@ def verify(
     with assembly_of(log) as assembly:
         begin = start_of(log, assembly, start)
         for block in fly(assembly, begin, [int(log.metadata["member"])]):
-            flown = one_vehicle(block)
+            flown = as_logged(one_vehicle(block), log.topics)
             _check_topics(log, block)
             logged = {
                 topic: log.read(topic, start=block.time[0], end=block.time[-1]) for topic in flown
@@ -220,17 +221,18 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
             assembly.sensors([0]).measurement(**absent | measured),
             type(desired)(*(values[0] for values in desired)),
         )
-        names = getattr(template, "_fields", ())
-        missing = [name for name in names if f"law_{name}" not in state]
+        fields = getattr(template, "_fields", ())
+        names = [logged_name(f"law_{field}", state) for field in fields]
+        missing = [field for field, name in zip(fields, names, strict=True) if name not in state]
         if missing:
             raise InputError(f"the log has no state {missing[0]!r} for this law: another flew")
-        law_state = type(template)(*(state[f"law_{name}"] for name in names)) if names else ()
+        law_state = type(template)(*(state[name] for name in names)) if names else ()
     return Start(number, state["physics"], sensors, law_state, actuators)
 
 
 def _check_topics(log: Log, block: Block) -> None:
     """Refuse a log whose topics are not those of the flight again, as of another version."""
-    flown = shapes(block)
+    flown = as_logged(shapes(block), log.topics)
     for topic in flown | log.topics:
         if flown.get(topic) != log.topics.get(topic):
             raise InputError(

@@ -21,7 +21,7 @@ from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
 from mjspace.scenario.sensors import Sensors, check_sensors
-from mjspace.units import any_to_si, whole_number
+from mjspace.units import to_si, whole_number
 
 
 class Component(BaseModel):
@@ -113,7 +113,7 @@ class Check(SignalRegion):
         if value is None:
             return None
         items = value if isinstance(value, list | tuple) else [value]
-        found = numbers([any_to_si(item) if isinstance(item, str) else item for item in items])
+        found = numbers(to_si(items, None))
         if found.ndim != 1 or not len(found) or not np.isfinite(found).all():
             raise ValueError(f"got {value!r}, should be a finite number or a list of them")
         return found.tolist() if isinstance(value, list | tuple) else float(found[0])

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from mjspace.contract import DesiredMotion, Law, Measurement
-from mjspace.errors import FlightError
-from mjspace.simulation.user_code import check_state, check_step
+from mjspace.simulation.user_code import ReturnError, check_state, check_step
 
 
 class UnbatchedLaw:
@@ -66,12 +65,12 @@ def _stack(name: str, tuples: Sequence[Any]) -> Any:
     """Return the named tuples as one, a vehicle axis before each field; None is an empty tuple.
 
     Raises:
-        FlightError: a field is not numeric, or fields or shapes differ between vehicles.
+        ReturnError: a field is not numeric, or fields or shapes differ between vehicles.
     """
     names = [getattr(one, "_fields", ()) for one in tuples]
     for other in names[1:]:
         if other != names[0]:
-            raise FlightError(
+            raise ReturnError(
                 f"the law's {name} has the fields {list(names[0])} for one vehicle and "
                 f"{list(other)} for another: it must return the same for all"
             )
@@ -82,7 +81,7 @@ def _stack(name: str, tuples: Sequence[Any]) -> Any:
         try:
             fields.append(np.array(column, dtype=float))
         except (TypeError, ValueError) as error:
-            raise FlightError(
+            raise ReturnError(
                 f"the law's {name}.{field} is not an array of numbers: {error}"
             ) from error
     return type(tuples[0])(*fields)

@@ -28,16 +28,18 @@ class Inertial(NamedTuple):
 class Rotors(NamedTuple):
     """Balanced rotors that are all alike, whose axial inertia the papers' H leaves out."""
 
-    axes: Array
+    axes: Array = np.zeros((0, 3))
     """Unit spin axes, body axes, shape (n, 3)."""
-    centres: Array
+    centres: Array = np.zeros((0, 3))
     """Of mass, body axes [m], shape (n, 3)."""
-    mass: float
+    mass: float = 0.0
     """Of each [kg]."""
-    inertia: float
+    inertia: float = 0.0
     """Axial, of each [kg m^2]."""
-    transverse_inertia: float
+    transverse_inertia: float = 0.0
     """About any axis through its centre across the spin axis [kg m^2]."""
+    speed_limit: float = np.inf
+    """Largest speed relative to the bus [rad/s]."""
 
 
 def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Inertial:

@@ -79,7 +79,8 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
     spec.nuserdata = userdata
 
-    rotors = table.wheels.rotors
+    on_bus = [fitted.rotors for fitted in table.equipment.values() if fitted.rotors is not None]
+    rotors = on_bus[0] if on_bus else mass_properties.Rotors()
     if table.vehicle_mass is not None:
         gyrostat = np.array(table.vehicle_inertia)
         inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, _others(spec))
@@ -96,7 +97,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
         wheel_axes=indices.frozen(rotors.axes),
         wheel_inertia=indices.frozen(np.full(len(rotors.axes), rotors.inertia)),
         driven=driven,
-        speed_limit=table.wheels.speed_limit or np.inf,
+        speed_limit=rotors.speed_limit,
         **indices.of(model, driven),
     )
 

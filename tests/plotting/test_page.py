@@ -12,7 +12,7 @@ from mjspace.log.reader import Log
 from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.plotting.decimate import outline
 from mjspace.plotting.page import figure, plot
-from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel
+from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel, read
 from mjspace.scenario.scenario import Check
 
 ERROR, RATE, SPEED, MOMENTUM = (
@@ -197,7 +197,7 @@ DEG = 180.0 / np.pi
 def test_bounds_stand_on_the_panel_of_their_signal(
     log: Log, panel: Panel, expected: list[Bound]
 ) -> None:
-    found = list(bounds(panel, CHECKS, log))
+    found = list(bounds(read(log, panel).panel, CHECKS, log))
     assert len(found) == len(expected)
     for one, other in zip(found, expected, strict=True):
         assert (one.text, one.upper, one.component) == (other.text, other.upper, other.component)
@@ -207,7 +207,9 @@ def test_bounds_stand_on_the_panel_of_their_signal(
 
 
 def test_bounds_are_drawn(page: Figure, log: Log) -> None:
-    expected = {bound.text for bound in bounds(ERROR, scenario_of(log).checks, log)}
+    expected = {
+        bound.text for bound in bounds(read(log, ERROR).panel, scenario_of(log).checks, log)
+    }
     assert expected
     assert expected <= {text.get_text() for text in page.axes[0].texts}
 

@@ -231,6 +231,8 @@ def test_a_wrong_return_is_named(tmp_path: Path, step: str, message: str) -> Non
 LINE = HEAD.count("\n") + 3
 """Of the first line of a law's ``step``, in own.py."""
 
+FLIGHT_ERROR = "from mjspace.errors import FlightError"
+
 
 @pytest.mark.parametrize("batched", ["true", "false"])
 @pytest.mark.parametrize(
@@ -242,6 +244,11 @@ LINE = HEAD.count("\n") + 3
         ("deep = lambda: 1 / 0\n    return deep()", "ZeroDivisionError at own.py:{line}: div"),
         ("return {}['gain']", "KeyError at own.py:{line}: 'gain'"),
         ("raise ValueError('one\\n  two')", "ValueError at own.py:{line}: one two"),
+        (f"{FLIGHT_ERROR}; raise FlightError('lost')", "FlightError at own.py:{line}: lost"),
+        (
+            f"{FLIGHT_ERROR}; raise type('Lost', (FlightError,), {{}})('far')",
+            "Lost at own.py:{line}: far",
+        ),
     ],
 )
 def test_what_a_law_raises_has_its_file_and_line(
