@@ -8,8 +8,8 @@ from typing import Any
 
 from mjspace.errors import InputError
 
-_REQUIRED = {"base", "description", "duration", "reference", "law"}
-"""Of these a scenario has the first or all others."""
+_HALLMARKS = {"base", "description", "duration", "reference", "law"}
+"""Keys of which a scenario has the first or all others."""
 
 
 def scenario_names() -> list[str]:
@@ -54,7 +54,7 @@ def read(path: Path, upon: tuple[Path, ...] = ()) -> dict[str, Any]:
         table = tomllib.loads(path.read_text())
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path}: {error}") from None
-    if not table.keys() & _REQUIRED:
+    if not table.keys() & _HALLMARKS:
         have = ", ".join(table) or "nothing"
         raise InputError(f"{path} is not a scenario: it has {have}, but no duration or law")
     table.setdefault("name", path.stem)

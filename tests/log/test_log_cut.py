@@ -276,7 +276,7 @@ def test_a_damaged_index_is_named(whole: Path) -> None:
     first = summary.chunk_indexes[0]
     content = bytearray(whole.read_bytes())
     for position in first.message_index_offsets.values():
-        content[position + 9 + 6 + 8 + 4] ^= 0xFF  # of the first offset
+        content[position + 9 + 6 + 8 + 7] ^= 0xFF  # of the first offset, its highest byte
     path = whole.with_name("damaged.mcap")
     path.write_bytes(content)
     where = f"the index of the chunk at byte {first.chunk_start_offset + 9} is damaged"
