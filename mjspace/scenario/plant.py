@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.equipment import Equipment
@@ -66,8 +66,6 @@ class Part(Table):
 
 class PlantTable(Table):
     """The vehicle: an assembly from assets/, with its mass properties, parts and actuators."""
-
-    model_config = ConfigDict(defer_build=True)
 
     model: str = "satellite_3rw"
     """Name of a folder in assets/."""
