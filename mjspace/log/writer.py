@@ -21,9 +21,8 @@ from mjspace.units import Unit
 class LogWriter:
     """A log that grows by one chunk with each block of control periods.
 
-    A background thread compresses and writes. What it raises (``OSError`` on a full disk) is raised
-    by the next call; the file then keeps every chunk before that one, as it does when the process
-    is killed.
+    A full disk is an ``OSError``; the file then keeps every chunk before that one, as it does when
+    the process is killed.
     """
 
     def __init__(
@@ -63,7 +62,7 @@ class LogWriter:
         ``rows`` holds every field of every topic, shape (n, ...).
 
         Raises:
-            OSError: an earlier chunk could not be written.
+            OSError: the chunk cannot be written, or an earlier one could not.
             ValueError: a time not after the one before it, or a wrong shape.
         """
         count = len(time)
@@ -87,7 +86,8 @@ class LogWriter:
         self._last = int(stamps[-1])
         periodic = {topic: self._channels[topic] for topic in self._topics}
         parts, self._pending = [block(records, periodic, stamps), *self._pending], []
-        self._file.add_chunk(parts, lambda: self._digests.add_rows(records))
+        self._file.add_chunk(parts)
+        self._digests.add_rows(records)
 
     def write_transforms(self, time: Array, positions: Array, quaternions: Array) -> None:
         """Log the scene's bodies in ``world`` on /tf, with the next chunk.
@@ -117,7 +117,7 @@ class LogWriter:
         self._pending.append(message(self._channels["/events"], stamp, entry.SerializeToString()))
 
     def flush(self) -> None:
-        """Wait until everything logged so far can be read from the file.
+        """Write what waits for the next chunk, so that it can be read from the file.
 
         Raises:
             OSError: something could not be written.
@@ -125,7 +125,6 @@ class LogWriter:
         parts, self._pending = self._pending, []
         if parts:
             self._file.add_chunk(parts)
-        self._file.flush()
 
     def close(self) -> None:
         """Write what is pending and the summary, and close the file; again does nothing.

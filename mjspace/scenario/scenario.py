@@ -55,7 +55,7 @@ class EventTable(SignalRegion):
 
 
 class Check(SignalRegion):
-    """One thing that the flight must show, judged from the log alone."""
+    """One thing that the flight must show, judged on every control period."""
 
     statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
     """Over the window: of the value, or of the norm of a vector; ``peak`` is the largest magnitude,

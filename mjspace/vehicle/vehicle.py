@@ -9,6 +9,7 @@ import gzip
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import mujoco
@@ -167,7 +168,13 @@ def to_bytes(model: Any) -> bytes:
     """Return the compiled model as gzipped MJB: equal models give equal bytes."""
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
-    return gzip.compress(buffer.tobytes(), compresslevel=3, mtime=0)
+    return compressed(buffer.tobytes())
+
+
+@lru_cache(maxsize=2)  # 10 MB each: the flights of one process mostly have the same model
+def compressed(mjb: bytes) -> bytes:
+    """Return a compiled model gzipped."""
+    return gzip.compress(mjb, compresslevel=3, mtime=0)
 
 
 def from_bytes(data: bytes) -> Any:
