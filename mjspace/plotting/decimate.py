@@ -27,7 +27,8 @@ def outline(
     Raises:
         ValueError: the log has no such topic or field, or no row.
     """
-    rows_logged = round((log.end - log.start) / float(log.metadata["control_period"])) + 1
+    period = float(log.metadata["control_period"]) * log.every[topic]
+    rows_logged = round((log.end - log.start) / period) + 1
     # Two points for each stretch, in their order: a stretch of two rows is those two.
     width = max(2, math.ceil(2 * rows_logged / points))
     stamps, rows, done = np.empty(0), None, []

@@ -1,6 +1,7 @@
 """Two signals of a log against each other: a phase plane, and when which thrusters fired."""
 
 import textwrap
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,16 @@ def figure(log: Log, x: str, y: str) -> Figure:
 
     Where thrusters fired, the path has the color of those that did; dots are where that changed.
     """
-    (across, x_label), (up, y_label) = (_component(log, signal) for signal in (x, y))
+    on_time = log.topics.get("/command", {}).get("on_time")
+    signals: list[tuple[Array, Any, str]] = [_component(log, signal) for signal in (x, y)]
+    if on_time:
+        fired = log.read("/command", ["on_time"])
+        signals.append((fired["time"], fired["on_time"] > 0.0, ""))
+    # The instants at which all are logged, should one be logged less often than another.
+    common = reduce(np.intersect1d, (time for time, *_ in signals))
+    (across, x_label), (up, y_label), *thrusters = (
+        (values[np.searchsorted(time, common)], label) for time, values, label in signals
+    )
     page = Figure(figsize=(WIDTH, HEIGHT))
     FigureCanvasAgg(page)
     axes = page.subplots()
@@ -49,9 +59,8 @@ def figure(log: Log, x: str, y: str) -> Figure:
     axes.axhline(0.0, color=FAINT, lw=0.7, zorder=1)
     axes.axvline(0.0, color=FAINT, lw=0.7, zorder=1)
     axes.plot(across, up, color=FAINT, lw=1.1, zorder=2, label="coast")
-    on_time = log.topics.get("/command", {}).get("on_time")
-    if on_time:
-        _show_thrusters(axes, across, up, log.read("/command", ["on_time"])["on_time"] > 0.0)
+    for firing, _ in thrusters:
+        _show_thrusters(axes, across, up, firing)
     _show_direction(axes, across, up)
     axes.plot(across[:1], up[:1], "o", color=INK, mfc="white", ms=6.5, zorder=6, label="start")
     axes.plot(across[-1:], up[-1:], "s", color=INK, ms=5.0, zorder=6, label="end")
@@ -68,17 +77,17 @@ def figure(log: Log, x: str, y: str) -> Figure:
     return page
 
 
-def _component(log: Log, signal: str) -> tuple[Array, str]:
-    """Return the signal's values (n,) in the displayed unit, and the label of their axis."""
+def _component(log: Log, signal: str) -> tuple[Array, Array, str]:
+    """Return time [s] and values (n,) in the displayed unit, and the label of their axis."""
     topic, field, part = find_signal(log.topics, signal)
     if part.stop - part.start != 1:
         raise ValueError(
             f"signal {signal!r} has {part.stop - part.start} numbers: pick one, as [0]"
         )
-    rows = log.read(topic, [field])[field]
-    values = rows.reshape(len(rows), -1)[:, part.start]
+    rows = log.read(topic, [field])
+    values = rows[field].reshape(len(rows["time"]), -1)[:, part.start]
     name, scale = unit(log, topic, field).displayed
-    return scale * values, f"{signal} [{name}]" if name else signal
+    return rows["time"], scale * values, f"{signal} [{name}]" if name else signal
 
 
 def _show_thrusters(axes: Any, across: Array, up: Array, firing: Any) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from mjspace.log import foxglove_layout, provenance, topics
 from mjspace.log.background import Background
+from mjspace.log.rows import due
 from mjspace.log.scene import scene
 from mjspace.log.schema import Scene
 from mjspace.log.writer import LogWriter
@@ -22,7 +23,6 @@ from mjspace.simulation.recording import Block, one_vehicle, shapes
 from mjspace.units import Unit
 from mjspace.vehicle import vehicle
 
-FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
 AHEAD = 2  # blocks that may wait for the disk: memory stays flat, and a kill costs no more
 
 
@@ -58,7 +58,8 @@ class Recorder:
         scenario = assembly.scenario
         self._judge = Judge(scenario.checks, scenario.events, shapes(first))
         self._model, self._data = assembly.vehicle.model, mujoco.MjData(assembly.vehicle.model)
-        self._stride = max(1, round(FRAME_PERIOD / scenario.rates.control))
+        self._first = first.period
+        self._every = scenario.log.every(scenario.rates.control)
         self._log: LogWriter
         self._opened = ExitStack()
         self._thread = Background("log", AHEAD)
@@ -125,6 +126,8 @@ class Recorder:
                 attachments,
                 _scene_of(model),
                 units_of(assembly, first.kinds),
+                self._every,
+                self._first,
             )
         )
 
@@ -141,16 +144,16 @@ class Recorder:
         self._log.event(time, level, text)
 
     def _write_frames(self, block: Block, physics: np.ndarray) -> None:
-        due = np.flatnonzero((block.period + np.arange(len(block.time))) % self._stride == 0)
-        positions = np.empty((len(due), self._model.nbody - 1, 3))
-        quaternions = np.empty((len(due), self._model.nbody - 1, 4))
-        for i, k in enumerate(due):
-            mujoco.mj_setState(
-                self._model, self._data, physics[k], mujoco.mjtState.mjSTATE_INTEGRATION
-            )
+        sequence = block.period - self._first + np.arange(len(block.time))
+        chosen = due(self._first, sequence, self._every["/tf"])
+        time, states = block.time[chosen], physics[chosen]
+        positions = np.empty((len(time), self._model.nbody - 1, 3))
+        quaternions = np.empty((len(time), self._model.nbody - 1, 4))
+        for i, state in enumerate(states):
+            mujoco.mj_setState(self._model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
             mujoco.mj_kinematics(self._model, self._data)
             positions[i], quaternions[i] = self._data.xpos[1:], self._data.xquat[1:]
-        self._log.write_transforms(block.time[due], positions, quaternions)
+        self._log.write_transforms(time, positions, quaternions)
 
 
 @lru_cache(maxsize=2)
