@@ -92,23 +92,23 @@ def fly_to_log(
     """
     start = start or first_start(assembly, [member])
     trouble, ended_by = "", None
-    with on_signals() as stop:
+    with on_signals() as stop, Recorder(assembly) as recorder:
         blocks = fly(assembly, start, [member], stop=stop)
         first = next(blocks)
         refuse_unknown(assembly.scenario.checks, shapes(first))
         path.parent.mkdir(parents=True, exist_ok=True)
-        with Recorder(assembly, path, member, first) as recorder:
-            try:
-                for block in chain([first], blocks):
-                    recorder.write(block)
-                    progress(float(block.time[-1]))
-            except FlightError as error:
-                trouble, ended_by = str(error), error
-            if stop():
-                trouble = f"interrupted by signal {stop.signal} at t = {recorder.time:.6g} s"
-            if trouble:
-                recorder.event("ERROR", trouble)
-            verdicts = recorder.verdicts()
-            for verdict in verdicts:
-                recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
+        recorder.begin(path, member, first)
+        try:
+            for block in chain([first], blocks):
+                recorder.write(block)
+                progress(float(block.time[-1]))
+        except FlightError as error:
+            trouble, ended_by = str(error), error
+        if stop():
+            trouble = f"interrupted by signal {stop.signal} at t = {recorder.time:.6g} s"
+        if trouble:
+            recorder.event("ERROR", trouble)
+        verdicts = recorder.verdicts()
+        for verdict in verdicts:
+            recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
     return Result(path, verdicts, trouble, stop.signal, ended_by)

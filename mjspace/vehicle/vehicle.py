@@ -9,7 +9,6 @@ import gzip
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import mujoco
@@ -164,21 +163,20 @@ def _set_joints(model: Any, data: Any, initial: Initial) -> None:
         data.qvel[model.jnt_dofadr[known[name]]] = value
 
 
-def to_bytes(model: Any) -> bytes:
-    """Return the compiled model as gzipped MJB: equal models give equal bytes."""
+def to_mjb(model: Any) -> bytes:
+    """Return the compiled model as MJB: equal models give equal bytes."""
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
-    return compressed(buffer.tobytes())
+    return buffer.tobytes()
 
 
-@lru_cache(maxsize=2)  # 10 MB each: the flights of one process mostly have the same model
-def compressed(mjb: bytes) -> bytes:
-    """Return a compiled model gzipped."""
+def packed(mjb: bytes) -> bytes:
+    """Return a compiled model gzipped: equal models give equal bytes."""
     return gzip.compress(mjb, compresslevel=3, mtime=0)
 
 
 def from_bytes(data: bytes) -> Any:
-    """Return the ``mujoco.MjModel`` that ``to_bytes`` wrote."""
+    """Return the ``mujoco.MjModel`` that was ``packed``."""
     return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": gzip.decompress(data)})
 
 

@@ -17,6 +17,7 @@ from mjspace.contract import Measurement, Reference
 from mjspace.log import topics
 from mjspace.log.chunk import encode
 from mjspace.log.reader import Log
+from mjspace.runner import flight_log
 from mjspace.runner.recorder import AHEAD
 from mjspace.runner.replay import assembly_of
 from mjspace.runner.run import run
@@ -239,13 +240,33 @@ def test_a_log_that_cannot_be_begun_ends_the_flight(tmp_path: Path) -> None:
         run("detumble-wheels", overrides=SHORT, out=tmp_path)
 
 
-def test_flights_of_one_model_compress_and_describe_it_once(tmp_path: Path) -> None:
-    vehicle.compressed.cache_clear()
-    for k in range(2):
-        run("detumble-wheels", overrides=SHORT, out=tmp_path / str(k))
-    assert vehicle.compressed.cache_info().hits == 1
-    first, second = (Log(tmp_path / f"{k}/flight.mcap") for k in range(2))
-    assert first.attachment("model.mjb.gz") == second.attachment("model.mjb.gz")
+def test_flights_of_one_model_compress_and_describe_it_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+
+    def counted(module: Any, name: str) -> None:
+        function = getattr(module, name)
+
+        def call(what: Any) -> Any:
+            done.append(name)
+            return function(what)
+
+        monkeypatch.setattr(module, name, call)
+
+    counted(vehicle, "packed")
+    counted(flight_log, "scene")
+    heavier = "plant.gyrostat_inertia=[[16, 0, 0], [0, 12, 0], [0, 0, 18]]"
+    models = {}
+    for number, change in enumerate(([], [], [heavier])):
+        flown = run("detumble-wheels", overrides=[*SHORT, *change], out=tmp_path / str(number))
+        models[number] = flown.log.attachment("model.mjb.gz")
+        if number == 0:
+            done.clear()  # the model may be that of an earlier flight
+        if number == 1:
+            assert done == []
+    assert done == ["packed", "scene"]
+    assert models[0] == models[1] != models[2]
 
 
 DIMENSIONLESS = {"attitude", "contact", "foot_contact", "hull_contact", "crash", "time"}
