@@ -109,10 +109,9 @@ def verify(
         begin = start_of(log, assembly, start)
         for block in fly(assembly, begin, [int(log.metadata["member"])]):
             _check_topics(log, block)
-            logged = {
-                topic: log.read(topic, start=block.time[0], end=block.time[-1])
-                for topic in block.rows
-            }
+            logged = log.read_topics(
+                dict.fromkeys(block.rows), start=block.time[0], end=block.time[-1]
+            )
             found = first_difference(logged, _at(logged, block, assembly.scenario.rates.control))
             if found is not None:
                 return dataclasses.replace(found, reason=_other_streams(log, assembly.scenario))

@@ -12,7 +12,7 @@ from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.log.reader import Log
 from mjspace.plotting import phase_plane
-from mjspace.plotting.decimate import outline
+from mjspace.plotting.decimate import Line, outlines
 from mjspace.rendering.render import nearest_rows
 from mjspace.runner import report
 from mjspace.runner.replay import replay, verify
@@ -149,7 +149,7 @@ def test_the_row_nearest_to_a_time_may_be_many_chunks_away(slower: Log) -> None:
 
 
 def test_a_line_has_as_many_points_as_its_topic_has_rows(slower: Log) -> None:
-    time, values = outline(slower, "/truth", "rate", points=40)
+    ((time, values),) = outlines(slower, [Line("/truth", "rate")], points=40)
     assert len(time) >= 29
     assert np.unique(time[:, 0]).tolist() == slower.read("/truth")["time"].tolist()
     assert values.shape == time.shape
