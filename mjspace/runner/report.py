@@ -108,9 +108,9 @@ def print_log(log: Log) -> None:
         for name, shape in fields.items():
             size = "x".join(map(str, shape)) or "1"
             listed.append(f"{name} {size}" + (f" [{units[name]}]" if name in units else ""))
-        every = log.every[topic]
-        period = every * float(log.metadata["control_period"])
-        often = f"every {period:g} s: " if every > 1 else ""
+        often = ""
+        if log.every[topic] > 1:
+            often = f"every {log.every[topic] * float(log.metadata['control_period']):g} s: "
         table.add_row(topic, escape(often + ", ".join(listed)))
     table.add_row("attachments", ", ".join(sorted(log.attachments)))
     altered = log.altered()
