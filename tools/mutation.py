@@ -79,6 +79,7 @@ GUARDS = {
         "scenario/test_user_files.py",
     ),
     "mjspace/runner/checks.py": ("runner/test_checks.py", "runner/test_verdict.py"),
+    "mjspace/runner/statistic.py": ("runner/test_checks.py",),
     "mjspace/runner/run.py": (
         "runner/test_verdict.py",
         "runner/test_run.py",

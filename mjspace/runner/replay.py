@@ -112,7 +112,8 @@ def verify(
             logged = log.read_topics(
                 dict.fromkeys(block.rows), start=block.time[0], end=block.time[-1]
             )
-            found = first_difference(logged, _at(logged, block, assembly.scenario.rates.control))
+            flown = _at(logged, log, block, assembly.scenario.rates.control)
+            found = first_difference(logged, flown)
             if found is not None:
                 return dataclasses.replace(found, reason=_other_streams(log, assembly.scenario))
             progress(float(block.time[-1]))
@@ -246,11 +247,13 @@ def _check_topics(log: Log, block: Block) -> None:
             )
 
 
-def _at(logged: Rows, block: Block, control: float) -> Rows:
+def _at(logged: Rows, log: Log, block: Block, control: float) -> Rows:
     """Return of a block, for each topic, the control periods that are ``logged``."""
     found = {}
     for topic, fields in one_vehicle(block).items():
-        chosen = np.rint(logged[topic]["time"] / control).astype(int) - block.period
+        chosen: Any = slice(None)
+        if log.every[topic] > 1:
+            chosen = np.rint(logged[topic]["time"] / control).astype(int) - block.period
         found[topic] = {name: rows[chosen] for name, rows in fields.items()}
     return found
 
