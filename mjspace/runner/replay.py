@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.contract import REPORTED_BY_PLANT, TICK
+from mjspace.contract import REPORTED_BY_PLANT, TICK, Array
 from mjspace.errors import InputError, input_error_at
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
@@ -108,12 +108,10 @@ def verify(
     with assembly_of(log) as assembly:
         begin = start_of(log, assembly, start)
         for block in fly(assembly, begin, [int(log.metadata["member"])]):
+            flown = one_vehicle(block)
             _check_topics(log, block)
-            logged = log.read_topics(
-                dict.fromkeys(block.rows), start=block.time[0], end=block.time[-1]
-            )
-            flown = _at(logged, log, block, assembly.scenario.rates.control)
-            found = first_difference(logged, flown)
+            logged = log.read_topics(dict.fromkeys(flown), start=block.time[0], end=block.time[-1])
+            found = first_difference(logged, _as_often(log, logged, flown, block.time))
             if found is not None:
                 return dataclasses.replace(found, reason=_other_streams(log, assembly.scenario))
             progress(float(block.time[-1]))
@@ -247,13 +245,13 @@ def _check_topics(log: Log, block: Block) -> None:
             )
 
 
-def _at(logged: Rows, log: Log, block: Block, control: float) -> Rows:
-    """Return of a block, for each topic, the control periods that are ``logged``."""
+def _as_often(log: Log, logged: Rows, flown: Rows, time: Array) -> Rows:
+    """Return of what was ``flown``, at ``time`` (n,) [s], the rows that each topic has ``logged``."""
     found = {}
-    for topic, fields in one_vehicle(block).items():
+    for topic, fields in flown.items():
         chosen: Any = slice(None)
         if log.every[topic] > 1:
-            chosen = np.rint(logged[topic]["time"] / control).astype(int) - block.period
+            chosen = np.searchsorted(time, logged[topic]["time"] - TICK)
         found[topic] = {name: rows[chosen] for name, rows in fields.items()}
     return found
 
