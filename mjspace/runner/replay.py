@@ -246,7 +246,7 @@ def _check_topics(log: Log, block: Block) -> None:
 
 
 def _as_often(log: Log, logged: Rows, flown: Rows, time: Array) -> Rows:
-    """Return of what was ``flown``, at ``time`` (n,) [s], the rows that each topic has ``logged``."""
+    """Return the rows of ``flown``, at ``time`` (n,) [s], that each topic has ``logged``."""
     found = {}
     for topic, fields in flown.items():
         chosen: Any = slice(None)
