@@ -32,6 +32,7 @@ ROOMS = {
     "attitude": "contract",
     "signals": "contract errors",
     "scenario": "contract errors ranges units",
+    "tracing": "gufunc",
     "vehicle": "contract errors scenario",
     "environment": "constants contract scenario vehicle",
     "sensors": "attitude contract gufunc scenario units",
@@ -41,7 +42,9 @@ ROOMS = {
     "log": "attitude contract scenario units",
     "plotting": "contract log scenario signals units",
     "rendering": "attitude contract environment errors log vehicle",
-    "simulation": "actuators attitude contract environment errors scenario sensors signals vehicle",
+    "simulation": (
+        "actuators attitude contract environment errors scenario sensors signals tracing vehicle"
+    ),
     "runner": "contract errors log scenario signals simulation units vehicle",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",

@@ -84,8 +84,9 @@ class CompiledBlocks:
             return self._off(f"{different} differs from Python's", columns, after)
         self._take(flight)
         if self._period.has_law:
-            kept = tuple(values.copy() for values in flight.law)
-            self._law.state = type(flight.law)._make(kept) if kept else ()
+            kind: Any = type(flight.law)
+            kept = [values.copy() for values in flight.law]
+            self._law.state = kind(*kept) if kept else ()
         self.seconds = (clock.monotonic() - began) / len(compiled)
         return compiled
 

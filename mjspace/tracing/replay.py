@@ -12,9 +12,10 @@ from mjspace.tracing.program import Calls
 
 _BYTE, _WORD = ir.IntType(8), ir.IntType(64)
 _POINTER = _BYTE.as_pointer()
+_intrinsic: Any = intrinsic
 
 
-@intrinsic
+@_intrinsic
 def call_loop(
     context: Any, loop: Any, operands: Any, dimensions: Any, steps: Any, data: Any
 ) -> Any:
@@ -29,7 +30,7 @@ def call_loop(
     return types.void(*[types.int64] * 5), generate
 
 
-@intrinsic
+@_intrinsic
 def copy_bytes(context: Any, target: Any, source: Any, size: Any) -> Any:
     """Copy ``size`` bytes between addresses that do not overlap."""
 
@@ -48,13 +49,13 @@ def address_of(array: Any) -> Any:
     return np.int64(array.ctypes.data)
 
 
-@njit(cache=True, nogil=True)
+@njit("int64[::1](int64[::1], int64[::1], int64)", cache=True)
 def placed(words: Any, relative: Any, base: int) -> Any:
     """Return the ``words`` of a program whose memory begins at the address ``base``."""
     return words + relative * base
 
 
-@njit(cache=True, nogil=True)
+@njit("void(int64[:, ::1], int64[::1])", cache=True)
 def run(table: Any, words: Any) -> None:
     """Call the loops of the ``table``, whose ``words`` have been placed."""
     base = address_of(words)

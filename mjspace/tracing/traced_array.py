@@ -37,18 +37,22 @@ class TracedArray(NDArrayOperatorsMixin):
 
     @property
     def shape(self) -> tuple[int, ...]:
+        """Length along each axis, as of any array."""
         return self.array.shape
 
     @property
     def ndim(self) -> int:
+        """Number of axes."""
         return self.array.ndim
 
     @property
     def size(self) -> int:
+        """Number of elements."""
         return self.array.size
 
     @property
     def dtype(self) -> np.dtype[Any]:
+        """float64 or bool."""
         return self.array.dtype
 
     @property

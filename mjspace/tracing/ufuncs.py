@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numba import guvectorize
 
+from mjspace.gufunc import gufunc
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.tracing.program import Program
 
@@ -13,7 +13,7 @@ _BOOL, _FLOAT = np.dtype(bool), np.dtype(float)
 _MATMUL = "(n,k),(k,m)->(n,m)"
 
 
-@guvectorize(["void(b1[:], f8[:], f8[:], f8[:])"], "(n),(n),(n)->(n)", cache=True)
+@gufunc(["void(b1[:], f8[:], f8[:], f8[:])"], "(n),(n),(n)->(n)")
 def _select(condition: Any, yes: Any, no: Any, result: Any) -> None:
     for i in range(condition.size):
         result[i] = yes[i] if condition[i] else no[i]
@@ -68,8 +68,8 @@ def reduce(
     Raises:
         Untraceable: the ufunc has no loop over the array's type.
     """
-    axes = range(array.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
-    axes = sorted(each % array.ndim for each in axes)
+    given = range(array.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
+    axes = sorted(each % array.ndim for each in given)
     if ufunc in (np.logical_or, np.logical_and) and array.dtype != _BOOL:
         array = apply(program, np.not_equal, "__call__", (array, 0.0), {})  # type: ignore[assignment]
     target = program.copied(ufunc.reduce(array, axis=tuple(axes), keepdims=keepdims))
