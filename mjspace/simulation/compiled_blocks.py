@@ -39,8 +39,17 @@ class CompiledBlocks:
         self._period: CompiledPeriod
         self._flight: CompiledFlight | None = None
         self.seconds = 0.0
-        self.reason = ", ".join(effect.name for effect in stepper.effects)
-        self.on = not self.reason
+        effects = " and ".join(effect.name for effect in stepper.effects)
+        self.reason = f"{effects} can act between compiled steps in Python alone" if effects else ""
+        self.on = not effects
+
+    def __str__(self) -> str:
+        """Return what is compiled, in one line."""
+        if not self.on:
+            return f"flown in Python: {self.reason}"
+        if self.reason:
+            return f"actuators compiled; sensors and law called in Python: {self.reason}"
+        return "compiled: sensors, law and actuators"
 
     def fly(
         self,

@@ -15,6 +15,7 @@ from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
+from mjspace.simulation.hidden_memory import copied, refuse_hidden_memory
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
@@ -119,6 +120,8 @@ class _Tracing:
         self.inputs = [self.time, self.physics, *self.memory.values(), *self.law_state]
         self.inputs += self.reference
         self.suite = assembly.sensors([0])
+        law = assembly.law
+        self.written_law: Any = law.law if isinstance(law, UnbatchedLaw) else law
 
     def with_law(self) -> CompiledPeriod:
         """Return the program of sensors, law and actuators.
@@ -126,6 +129,7 @@ class _Tracing:
         Raises:
             Untraceable: as ``compile_period``; or the sensors err.
         """
+        self.law = copied(self.written_law)
         if self.suite.ticks:
             raise Untraceable("sensors err, or sample at times of their own")
         with self.program.section() as sensing:
@@ -227,18 +231,19 @@ class _Tracing:
         return measurement
 
     def _law_step(self, measurement: Any) -> tuple[Any, Any, Any]:
-        law: Any = self.assembly.law
-        step = law.step_of_one if isinstance(law, UnbatchedLaw) else law.step
+        unbatched = isinstance(self.assembly.law, UnbatchedLaw)
+        step = UnbatchedLaw(self.law).step_of_one if unbatched else self.law.step
         state, reference = self._all_traced(self.law_state), self._all_traced(self.reference)
         with _of_the_law():
             after, command, signals = step(state, self._traced(self.time), measurement, reference)
+        refuse_hidden_memory(self.law, self.written_law)
         return after or (), command, signals or ()
 
     def _law_inner(self, command: Any, measurement: Any) -> tuple[Any, Any]:
-        law: Any = self.assembly.law
         state = self._all_traced(self.law_state)
         with _of_the_law():
-            after, motors = law.inner(state, self._traced(self.time), command, measurement)
+            after, motors = self.law.inner(state, self._traced(self.time), command, measurement)
+        refuse_hidden_memory(self.law, self.written_law)
         return after or (), motors
 
     def _held(self, array: Any) -> np.ndarray:

@@ -15,7 +15,7 @@ from mjspace.simulation.compiled_blocks import CompiledBlocks
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.events import with_declared_events
 from mjspace.simulation.flown_law import FlownLaw
-from mjspace.simulation.initial_state import Start, last_period
+from mjspace.simulation.initial_state import Start, first_start, last_period
 from mjspace.simulation.recording import (
     OF_THE_LAW,
     OF_THE_VEHICLE,
@@ -78,6 +78,19 @@ def fly(
         period += len(columns)
 
 
+def what_is_compiled(assembly: Assembly) -> str:
+    """Return in one line what of a flight is compiled, and why the rest is not: by beginning one.
+
+    Raises:
+        FlightError: it cannot be flown.
+    """
+    flight = _Flight(assembly, first_start(assembly, [0]), [0], threads=1)
+    _, _, trouble = flight.record(0, last_period(assembly.scenario), lambda: False)
+    if trouble is not None:
+        raise trouble
+    return str(flight.compiled)
+
+
 class _Flight:
     """The law and the vehicles that it flies."""
 
@@ -88,7 +101,7 @@ class _Flight:
         self._law = FlownLaw(assembly.law, start.law, len(members))
         inner = self._law.inner if assembly.inner else None
         self.stepper = Stepper(assembly, start, members, threads=threads, inner=inner)
-        self._compiled = CompiledBlocks(assembly, start, self.stepper, self._law, threads)
+        self.compiled = CompiledBlocks(assembly, start, self.stepper, self._law, threads)
         # Each period, with law, signals and measurement.
         recorded = 4 * self.stepper.batch.state.nbytes
         self._periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
@@ -103,15 +116,15 @@ class _Flight:
         count = min(self._periods, last - first + 1)
         times = np.arange(first, first + count, dtype=float) * self._control
         desired = reference_at(self._assembly.reference, times)
-        if not self._compiled.on:
+        if not self.compiled.on:
             columns, _, trouble = self._fly_in_python(first, count, last, desired, stop)
             return columns, desired, trouble
         began = clock.monotonic()
         columns, period, trouble = self._fly_in_python(first, 1, last, desired, stop)
-        seconds = self._compiled.seconds or clock.monotonic() - began  # of a period
-        count = int(min(count, BLOCK_SECONDS / seconds))
+        seconds = self.compiled.seconds or clock.monotonic() - began  # of a period
+        count = min(count, max(2, int(min(count, BLOCK_SECONDS / seconds))))
         if count > 1 and columns is not None and trouble is None:
-            columns = self._compiled.fly(period, columns, count, last, desired, stop)
+            columns = self.compiled.fly(period, columns, count, last, desired, stop)
         return columns, desired, trouble
 
     def _fly_in_python(

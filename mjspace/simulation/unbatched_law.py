@@ -10,15 +10,19 @@ from mjspace.simulation.user_code import ReturnError, check_state, check_step
 
 
 class UnbatchedLaw:
-    """A law of arrays without a vehicle axis, flown on arrays with one."""
+    """A law of arrays without a vehicle axis, flown on arrays with one.
+
+    Attributes:
+        law: that law.
+    """
 
     def __init__(self, law: Law) -> None:
-        self._law = law
+        self.law = law
 
     def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
         """Return the law's state with a vehicle axis."""
         vehicles = range(len(measurement.rate))
-        states = [self._law.reset(_of_vehicle(measurement, v), reference) for v in vehicles]
+        states = [self.law.reset(_of_vehicle(measurement, v), reference) for v in vehicles]
         for state in states:
             check_state(state)
         return _stack("state", states)
@@ -46,7 +50,7 @@ class UnbatchedLaw:
     ) -> tuple[Any, Any, Any]:
         """Return what the law returns for that vehicle."""
         own = type(state)(*(field[vehicle] for field in state)) if state else state
-        returned = self._law.step(own, time, _of_vehicle(measurement, vehicle), reference)
+        returned = self.law.step(own, time, _of_vehicle(measurement, vehicle), reference)
         check_step(returned)
         return returned
 

@@ -174,13 +174,16 @@ def push(time, truth):
         flown(tmp_path, code, *orbit)
 
 
-def test_a_reference_cannot_change_what_it_has_returned(tmp_path: Path) -> None:
+def test_a_reference_cannot_change_what_it_has_returned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", 10)  # it is asked in each block
     code = (
         law(GOOD)
         + """
 class Source:
     def __init__(self):
-        self.rows = np.zeros((9000, 3))
+        self.rows = np.zeros((1000, 3))
     def at(self, time):
         n = len(time)
         self.rows += 1.0
