@@ -304,7 +304,7 @@ class Gains:
 
 
 def gain(
-    unit: str = "",
+    unit: str | None = "",
     shape: tuple[int | str | None, ...] = (),
     default: Any = MISSING,
     *,
@@ -317,19 +317,20 @@ def gain(
 ) -> Any:
     """Declare a law's or a reference's parameter: its SI unit, array shape and range.
 
-    In ``shape``, None is any length, and a name is a length that all gains with that name share:
-    ``("wheel", 3)`` and ``("wheel",)``. Every number has to be finite and within ``above`` or
-    ``at_least`` and ``below`` or ``at_most``; ``at_most=inf`` admits infinity, for a limit that may
-    be absent. ``whole`` admits whole numbers only. ``form`` is what the array has to be as a whole:
-    an "inertia" (symmetric, positive definite), or rows that are each a "direction" (not zero), a
-    "unit vector" or a "quaternion" (of norm 1 to 1e-3), or "increasing" values.
+    Where the unit depends on another gain, as that of a bound on a signal, it is None: a quantity
+    of any dimension is converted. In ``shape``, None is any length, and a name is a length that all
+    gains with that name share: ``("wheel", 3)`` and ``("wheel",)``. Every number has to be finite
+    and within ``above`` or ``at_least`` and ``below`` or ``at_most``; ``at_most=inf`` admits
+    infinity, for a limit that may be absent. ``whole`` admits whole numbers only. ``form`` is what
+    the array has to be as a whole: an "inertia" (symmetric, positive definite), or rows that are
+    each a "direction" (not zero), a "unit vector" or a "quaternion" (of norm 1 to 1e-3), or
+    "increasing" values.
 
     The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
-    constructed in Python. A gain without a default that is named
-    like one of the plant's properties (``inertia``, ``wheel_axes``, ``wheel_inertia``; with gimbals
-    that have speed loops ``gimbal_axes`` and ``spin_axes``), or
-    ``control_period`` or ``inner_period``, may be left out of the table: it is then taken from the
-    vehicle as flown.
+    constructed in Python. A gain without a default that is named like one of the plant's properties
+    (``inertia``, ``wheel_axes``, ``wheel_inertia``; with gimbals that have speed loops
+    ``gimbal_axes`` and ``spin_axes``), or ``control_period`` or ``inner_period``, may be left out
+    of the table: it is then taken from the vehicle as flown.
     """
     limits = Range(above, at_least, below, at_most, whole)
     metadata = {"unit": unit, "shape": shape, "range": limits, "form": form}

@@ -110,11 +110,12 @@ def units_of(kind: type) -> dict[str, Unit]:
     return {name: units[0] for name, units in found.items() if units}
 
 
-def to_si(value: Any, unit: str) -> Any:
+def to_si(value: Any, unit: str | None) -> Any:
     """Return ``value`` with every quantity string in it converted to the SI unit ``unit``.
 
-    A number is taken as SI; a string is a number and a unit of the same dimension, ``"30 deg/s"``;
-    lists are converted element by element and anything else is returned as it is.
+    A number is taken as SI; a string is a number and a unit of the same dimension, ``"30 deg/s"``,
+    or of any dimension where ``unit`` is None. Lists are converted element by element and anything
+    else is returned as it is.
 
     Raises:
         ValueError: the string is not a number with a unit, or the unit measures something else.
@@ -123,6 +124,8 @@ def to_si(value: Any, unit: str) -> Any:
         return [to_si(item, unit) for item in value]
     if not isinstance(value, str):
         return value
+    if unit is None:
+        return _any_to_si(value)
     if not unit:
         raise ValueError(f"got the text {value!r}, should be a plain number")
     magnitude, written = _split(value)
@@ -134,19 +137,6 @@ def to_si(value: Any, unit: str) -> Any:
         raise ValueError(f"{value!r} has the unit {written!r}, should be {which}")
     if written == unit:
         return magnitude
-    return magnitude * UNITS[written][1]
-
-
-def any_to_si(value: str) -> float:
-    """Return the quantity ``value`` in the SI unit of whatever it measures.
-
-    Raises:
-        ValueError: not a number with a unit, or an unknown unit.
-    """
-    magnitude, written = _split(value)
-    if written not in UNITS:
-        what = f"the unknown unit {written!r}" if written else "no unit"
-        raise ValueError(f"{value!r} has {what}: have {', '.join(UNITS)}, or write a plain number")
     return magnitude * UNITS[written][1]
 
 
@@ -192,6 +182,19 @@ def whole_number(span: float, unit: float, span_key: str, unit_key: str) -> int:
             f"the nearest are {' and '.join(near)}"
         )
     return count
+
+
+def _any_to_si(value: str) -> float:
+    """Return the quantity ``value`` in the SI unit of whatever it measures.
+
+    Raises:
+        ValueError: not a number with a unit, or an unknown unit.
+    """
+    magnitude, written = _split(value)
+    if written not in UNITS:
+        what = f"the unknown unit {written!r}" if written else "no unit"
+        raise ValueError(f"{value!r} has {what}: have {', '.join(UNITS)}, or write a plain number")
+    return magnitude * UNITS[written][1]
 
 
 def _split(value: str) -> tuple[float, str]:

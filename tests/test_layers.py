@@ -24,6 +24,7 @@ A_LAW_MAY_IMPORT = (
 ROOMS = {
     "constants": "",
     "errors": "",
+    "gufunc": "",
     "ranges": "",
     "units": "",
     "scenarios": "",
@@ -31,14 +32,19 @@ ROOMS = {
     "attitude": "contract",
     "signals": "contract errors",
     "scenario": "contract errors ranges units",
+    "tracing": "gufunc",
     "vehicle": "contract errors scenario",
     "environment": "constants contract scenario vehicle",
-    "sensors": "attitude contract scenario units",
-    "actuators": "constants contract environment errors scenario sensors signals units vehicle",
+    "sensors": "attitude contract gufunc scenario units",
+    "actuators": (
+        "constants contract environment errors gufunc scenario sensors signals units vehicle"
+    ),
     "log": "attitude contract scenario units",
     "plotting": "contract log scenario signals units",
     "rendering": "attitude contract environment errors log vehicle",
-    "simulation": "actuators attitude contract environment errors scenario sensors signals vehicle",
+    "simulation": (
+        "actuators attitude contract environment errors scenario sensors signals tracing vehicle"
+    ),
     "runner": "contract errors log scenario signals simulation units vehicle",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",

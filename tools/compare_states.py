@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from mjspace.log.reader import Log
+from mjspace.runner.former_names import as_logged
 from mjspace.runner.replay import first_difference
 from mjspace.simulation.recording import Rows
 
@@ -21,7 +22,8 @@ def state(path: Path) -> Rows:
 
 def compare(before: Path, after: Path) -> str:
     """Return how the states of two logs differ, '' where they are the same bytes."""
-    one, other = state(before), state(after)
+    one = state(before)
+    other = as_logged(state(after), one)
     fields = one["/state"].keys() ^ other["/state"].keys()
     if fields:
         return f"only one of them has {', '.join(sorted(fields))}"

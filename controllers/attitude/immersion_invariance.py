@@ -23,7 +23,7 @@ class State(NamedTuple):
 
     angles: Array
     """Last measured roll, pitch, yaw [rad], unwrapped, (..., 3)."""
-    wanted_angles: Array
+    desired_angles: Array
     """Last desired roll, pitch, yaw [rad], unwrapped, (..., 3)."""
 
 

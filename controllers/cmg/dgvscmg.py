@@ -24,7 +24,7 @@ from . import steering
 class State(NamedTuple):
     """Memory of the motors' loops; the attitude and steering laws have none."""
 
-    wheel_wanted: Array
+    desired_wheel_speed: Array
     """Desired absolute speed of the wheel about its axis [rad/s], (..., 1)."""
     speed_memory: Array
     """Of the speed loops, (..., 3, 9)."""
@@ -177,7 +177,7 @@ class Cascade(Gains):
             np.concatenate([self.gyroscopic_feedforward * load, none], axis=-1),
         )
         found = motor_loops.estimates(state.speed_memory[..., 2:, :])
-        desired = np.concatenate([command.gimbal_rate, state.wheel_wanted], axis=-1)
+        desired = np.concatenate([command.gimbal_rate, state.desired_wheel_speed], axis=-1)
         error = desired - _speeds(measurement) - _carried(measurement)
         signals = Signals(sigma_e, s, torque, authority, error, found.z1_hat, found.phi_hat)
         return state, command, signals
@@ -187,7 +187,7 @@ class Cascade(Gains):
     ) -> tuple[State, VoltageCommand]:
         """Return the motors' voltages for the desired speeds."""
         speed = _speeds(measurement)
-        memory, wheel_speed = state.speed_memory, state.wheel_wanted
+        memory, wheel_speed = state.speed_memory, state.desired_wheel_speed
         if self.speed_steps == 1 or round(time / self.inner_period) % self.speed_steps == 0:
             memory, _ = self._speed_loop.step(
                 memory,

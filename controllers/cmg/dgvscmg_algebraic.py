@@ -31,11 +31,11 @@ class State(NamedTuple):
     """Hinge angles [rad], (..., 3)."""
     speed: Array
     """Hinge rates [rad/s], (..., 3)."""
-    wanted: Array
+    desired_speed: Array
     """Desired hinge rates [rad/s], (..., 3)."""
     speed_memory: Array
     """Of the speed loops, (..., 3, 9)."""
-    given: Array
+    applied_torque: Array
     """Torque -chi eta of the last inner period [N m], body axes, (..., 3)."""
 
 
@@ -92,19 +92,19 @@ class Algebraic(dgvscmg.Cascade):
         state = State(zero, speed, speed, self._speed_loop.reset(speed), zero)
         _, command, _ = self._cascaded(state, 0.0, measurement, reference)
         desired = np.concatenate([command.gimbal_rate, speed[..., 2:]], axis=-1)
-        return state._replace(wanted=desired)
+        return state._replace(desired_speed=desired)
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[Any, dgvscmg.SpeedCommand, Any]:
         """Return the command with the accelerations that bring the gimbals to their rates."""
         _, command, own = self._cascaded(state, time, measurement, reference)
-        slope = (command.gimbal_rate - state.wanted[..., :2]) / self.control_period
+        slope = (command.gimbal_rate - state.desired_speed[..., :2]) / self.control_period
         acceleration = np.concatenate([slope, command.acceleration[..., 2:]], axis=-1)
         signals = Signals(
             own.sigma_e,
             own.torque,
-            state.given - own.torque,
+            state.applied_torque - own.torque,
             own.authority,
             state.angle[..., :2],
             state.speed[..., :2],
@@ -123,14 +123,14 @@ class Algebraic(dgvscmg.Cascade):
             state.speed_memory,
             np.stack([np.zeros_like(q), q], axis=-1),
             state.speed,
-            state.wanted,
+            state.desired_speed,
             command.acceleration,
             np.zeros_like(q),
         )
         angle, speed, output, torque = _advance.ufunc(
             state.angle, state.speed, self.torque_constant * current, measurement.rate, self._model
         )
-        desired = state.wanted + self.inner_period * command.acceleration
+        desired = state.desired_speed + self.inner_period * command.acceleration
         return State(angle, speed, desired, memory, output), TorqueCommand(torque)
 
     def _cascaded(
@@ -142,7 +142,9 @@ class Algebraic(dgvscmg.Cascade):
             gimbal_rate=state.speed[..., :2],
             wheel_speed=state.speed[..., 2:],
         )
-        memory = dgvscmg.State(state.wanted[..., 2:], state.speed_memory, state.given)
+        memory = dgvscmg.State(
+            state.desired_speed[..., 2:], state.speed_memory, state.applied_torque
+        )
         return super().step(memory, time, modelled, reference)
 
     @cached_property

@@ -21,7 +21,7 @@ from . import dgvscmg
 class State(NamedTuple):
     """Memory of the cascade, field by field, and of the observer."""
 
-    wheel_wanted: Array
+    desired_wheel_speed: Array
     speed_memory: Array
     voltage_integral: Array
     observer: Array

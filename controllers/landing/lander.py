@@ -39,9 +39,9 @@ class Signals(NamedTuple):
     """z3 to z9 of the errors, (..., 7)."""
     S: Array
     """The sliding variables, (..., 3)."""
-    wanted_thrust: Array
+    desired_thrust: Array
     """Commanded thrust before its limits [N], (..., 1)."""
-    wanted_gimbal: Array
+    desired_gimbal: Array
     """Commanded gimbal angles before their limits, outer and inner [rad], (..., 2)."""
 
 

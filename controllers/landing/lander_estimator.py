@@ -17,11 +17,11 @@ from .lander_filter import FilterState, Navigation
 class Estimates(NamedTuple):
     """The filter's signals, logged beside those of the law."""
 
-    believed_position: Array
+    estimated_position: Array
     """World axes [m], (..., 3)."""
-    believed_velocity: Array
+    estimated_velocity: Array
     """World axes [m/s], (..., 3)."""
-    believed_attitude: Array
+    estimated_attitude: Array
     """Quaternion, body to world, (..., 4)."""
     sigma: Array
     """Estimated standard deviations of position [m] and velocity [m/s], world axes, and of the

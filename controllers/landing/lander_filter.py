@@ -22,13 +22,13 @@ from .lander_gains import LunarGravity
 class FilterState(NamedTuple):
     """State of the filter: estimates and their covariance."""
 
-    believed_position: Array
+    estimated_position: Array
     """World axes [m], (..., 3)."""
-    believed_velocity: Array
+    estimated_velocity: Array
     """World axes [m/s], (..., 3)."""
-    believed_attitude: Array
+    estimated_attitude: Array
     """Quaternion, body to world, (..., 4)."""
-    believed_bias: Array
+    estimated_bias: Array
     """Biases of the accelerometer [m/s^2], then of the gyro [rad/s], body axes, (..., 6)."""
     covariance: Array
     """Of the errors in the order above, attitude error in body axes [rad], (..., 15, 15)."""
@@ -99,7 +99,7 @@ class Navigation(LunarGravity):
     def estimated(self, estimate: FilterState, measurement: Measurement) -> Measurement:
         """Return ``measurement`` with position, velocity, attitude and rate as estimated."""
         position, velocity, attitude = estimate[:3]
-        rate = measurement.rate - estimate.believed_bias[..., 3:]
+        rate = measurement.rate - estimate.estimated_bias[..., 3:]
         return measurement._replace(
             position=position, velocity=velocity, attitude=attitude, rate=rate
         )

@@ -39,9 +39,9 @@ class Signals(NamedTuple):
     pointing_error: Array
     """Sine of the rotation from the thrust axis to the desired one [rad], body x and y, (..., 2).
     """
-    wanted_thrust: Array
+    desired_thrust: Array
     """Commanded thrust before its limits [N], (..., 1)."""
-    wanted_gimbal: Array
+    desired_gimbal: Array
     """Commanded gimbal angles before their limits, outer and inner [rad], (..., 2)."""
 
 

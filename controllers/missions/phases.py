@@ -22,18 +22,18 @@ class Until(Gains):
     signal: str = ""
     """A field of the measurement, whose norm counts, or one of its components: ``rate``,
     ``rate[2]``."""
-    below: float = gain(default=np.inf, at_most=np.inf)
-    """The signal must be less, in SI."""
-    above: float = gain(default=-np.inf, at_least=-np.inf)
-    """The signal must be greater, in SI."""
+    below: float = gain(None, default=np.inf, at_most=np.inf)
+    """The signal must be less; a number in SI or a quantity."""
+    above: float = gain(None, default=-np.inf, at_least=-np.inf)
+    """The signal must be greater; a number in SI or a quantity."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.signal, str):
-            raise ValueError(f"until.signal: got {self.signal!r}, should be text")
+            raise ValueError(f"signal: got {self.signal!r}, should be text")
         bounded = np.isfinite(self.below) or np.isfinite(self.above)
         if bounded != bool(self.signal):
-            raise ValueError("until: a signal and below or above go together")
+            raise ValueError("a signal and below or above go together")
         if self.signal:
             self._parsed()
 
@@ -51,7 +51,7 @@ class Until(Gains):
         name, bracket, part = self.signal.removesuffix("]").partition("[")
         if not name.isidentifier() or bool(bracket) != part.isdigit():
             raise ValueError(
-                f"until.signal: got {self.signal!r}, should be what is measured or a component of "
+                f"signal: got {self.signal!r}, should be what is measured or a component of "
                 "it, as 'rate' or 'rate[2]'"
             )
         return name, int(part) if bracket else None
@@ -64,8 +64,18 @@ class Phase:
     name: str
     """Prefix of the names of its state and signals: lower case, digits and underscores."""
     law: Law
+    """In a scenario a table with the law's ``kind`` and gains."""
     until: Until | None = None
     """The last phase has none."""
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name.isidentifier() and self.name.islower()):
+            raise ValueError(f"name: got {self.name!r}, should be a word in lower case")
+        if not hasattr(self.law, "step") or hasattr(self.law, "inner"):
+            raise ValueError("law: should be a table with the kind of a law that has no inner")
+        if not isinstance(self.until, Until | None):
+            keys = ", ".join(each.name for each in fields(Until))
+            raise ValueError(f"until: got {self.until!r}, should be a table with {keys}")
 
 
 @dataclass(frozen=True)
@@ -76,20 +86,18 @@ class Phases:
     the phases of other laws. The signals have those of every law, NaN while it does not fly.
     """
 
-    phases: Sequence[Any]
-    """Tables with the keys of ``Phase``; ``law`` and ``until`` are tables, too."""
+    phases: Sequence[Phase]
 
     def __post_init__(self) -> None:
         tables = isinstance(self.phases, Sequence) and not isinstance(self.phases, str)
-        if not tables or not all(isinstance(table, Mapping) for table in self.phases):
+        if not tables or not all(isinstance(phase, Phase) for phase in self.phases):
             raise ValueError(f"phases: got {self.phases!r}, should be a list of tables")
-        built = tuple(_phase(number, table) for number, table in enumerate(self.phases))
-        object.__setattr__(self, "phases", built)
-        names = [phase.name for phase in built]
+        object.__setattr__(self, "phases", tuple(self.phases))
+        names = [phase.name for phase in self.phases]
         if not names or len(set(names)) < len(names):
             raise ValueError(f"phases: got {names}, should be one or more, with different names")
-        for number, phase in enumerate(built):
-            last = number == len(built) - 1
+        for number, phase in enumerate(self.phases):
+            last = number == len(names) - 1
             if last != (phase.until is None):
                 how = "is the last and takes no" if last else "would never end: it needs an"
                 raise ValueError(f"phases.{number}: {phase.name!r} {how} until")
@@ -134,8 +142,9 @@ class Phases:
         """Return (state, command, signals), those of the law that is active at ``time`` [s]."""
         phase, began = state.phase[..., 0], state.began[..., 0]
         due = np.zeros(phase.shape, dtype=bool)
-        for number, spec in enumerate(self.phases[:-1]):
-            due |= (phase == number) & spec.until.holds(time - began, measurement)
+        for number, spec in enumerate(self.phases):
+            if spec.until is not None:
+                due |= (phase == number) & spec.until.holds(time - began, measurement)
         phase, began = phase + due, np.where(due, time, began)
         after: dict[str, Any] = {"phase": phase[..., None], "began": began[..., None]}
         command = _filled(state.layout.command, phase.shape, 0.0)
@@ -176,25 +185,6 @@ class _Layout:
         like = self.states[number]
         names = getattr(like, "_fields", ())
         return type(like)(*(getattr(state, f"{name}_{n}") for n in names)) if names else like
-
-
-def _phase(number: int, table: Mapping[str, Any]) -> Phase:
-    """Return the phase that a table describes; ValueError if it does not describe one."""
-    try:
-        until = table.get("until")
-        phase = Phase(**{**table, "until": None if until is None else Until(**until)})
-    except (TypeError, ValueError) as error:
-        keys = ", ".join(f.name for kind in (Phase, Until) for f in fields(kind))
-        raise ValueError(f"phases.{number}: {error} (a phase and its until have {keys})") from None
-    if not (isinstance(phase.name, str) and phase.name.isidentifier() and phase.name.islower()):
-        raise ValueError(
-            f"phases.{number}.name: got {phase.name!r}, should be a word in lower case"
-        )
-    if not hasattr(phase.law, "step") or hasattr(phase.law, "inner"):
-        raise ValueError(
-            f"phases.{number}.law: should be a table with the kind of a law that has no inner"
-        )
-    return phase
 
 
 def _tuple(

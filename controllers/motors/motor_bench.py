@@ -30,7 +30,7 @@ class BenchSignals(NamedTuple):
 
     speed_error: Array
     """Desired less measured speed [rad/s]."""
-    wanted_current: Array
+    desired_current: Array
     """I_q*: commanded current [A]."""
     vibration_hat: Array
     """Estimated vibration torque on the rotor [N m]."""

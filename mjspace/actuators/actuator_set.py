@@ -1,6 +1,6 @@
 """Actuators of several kinds side by side, each of which obeys its own fields of the command."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any, TypeVar
@@ -12,6 +12,7 @@ from mjspace.contract import Array, Measurement
 from mjspace.errors import FlightError, failure
 
 Result = TypeVar("Result")
+_FLOAT = np.dtype(float)
 
 
 @dataclass(frozen=True)
@@ -98,13 +99,13 @@ class ActuatorSet:
             saturated.append(cut)
         return state, tuple(applied), np.concatenate(saturated, axis=-1)
 
-    def seen(self, state: State, truth: Measurement) -> Measurement:
+    def measured(self, state: State, truth: Measurement) -> Measurement:
         """Return the truth with what the actuators' own sensors measure."""
         for kind in self.kinds:
             truth = _of(kind, kind.measured, state, truth)
         return truth
 
-    def logged(self, applied: Sequence[Array]) -> dict[str, Array]:
+    def logged(self, applied: Iterable[Array]) -> dict[str, Array]:
         """Return the fields of /command for what each kind applied."""
         return {kind.logged_as: values for kind, values in zip(self.kinds, applied, strict=True)}
 
@@ -146,7 +147,7 @@ def _check(command: Any, takes: Fields, vehicles: int) -> None:
         value = getattr(command, name, None)
         shape = (vehicles, *((width,) if isinstance(width, int) else width))
         # Also an array that is traced, and no np.ndarray.
-        if getattr(value, "shape", None) == shape and getattr(value, "dtype", None) == float:
+        if getattr(value, "shape", None) == shape and getattr(value, "dtype", None) == _FLOAT:
             continue  # in a quarter of a microsecond
         right = f"it must be of shape {_without_vehicles(shape)} [{unit}]"
         if value is None:

@@ -16,7 +16,7 @@ from mjspace.scenario.fields import Finite, Seconds, Table, Time
 from mjspace.scenario.region import Region
 from mjspace.sensors.noise import normals
 from mjspace.signals import find_signal, magnitude
-from mjspace.units import any_to_si
+from mjspace.units import to_si
 
 STREAM = 1000
 """First number of the faults' random streams; the sensors' are hashes of their names."""
@@ -49,7 +49,7 @@ class Fault(Table):
     @field_validator("value", mode="before")
     @classmethod
     def _quantity(cls, value: Any) -> Any:
-        return any_to_si(value) if isinstance(value, str) else value
+        return to_si(value, None)
 
     @model_validator(mode="after")
     def _consistent(self) -> "Fault":

@@ -6,7 +6,6 @@ from math import inf
 from typing import Annotated, Any, ClassVar, Literal
 
 import mujoco
-import numba
 import numpy as np
 from pydantic import model_validator
 
@@ -20,6 +19,7 @@ from mjspace.actuators.base import (
     motors,
 )
 from mjspace.contract import Array, Measurement
+from mjspace.gufunc import gufunc
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import Meters3, Positive, Si, Unit3
 from mjspace.scenario.hinges import Bearing, Friction
@@ -76,7 +76,8 @@ class Wheels(ActuatorTable, Bearing):
         centres = np.zeros_like(axes) if self.positions is None else np.array(self.positions)
         half = self.inertia / 2.0
         transverse = half if self.transverse_inertia is None else self.transverse_inertia
-        return mass_properties.Rotors(axes, centres, self.mass, self.inertia, transverse)
+        limit = self.speed_limit or inf
+        return mass_properties.Rotors(axes, centres, self.mass, self.inertia, transverse, limit)
 
     def attach(self, spec: Any) -> None:
         """Bolt each wheel to the bus, its z axis along the spin axis."""
@@ -285,10 +286,9 @@ class ReactionWheels(Actuator):
 
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
-@numba.guvectorize(
+@gufunc(
     ["void(f8[:], f8[:], f8[:, :], f8[:], f8[:], f8[:], f8[:, :], f8, f8[:], f8[:])"],
     "(k),(n),(n,k),(n),(m),(n),(u,k),()->(n),(n)",
-    cache=True,
 )
 def _motor_torque(
     torque: Any,

@@ -12,9 +12,9 @@ from mjspace.terminal.reporting import open_log
 
 def list_scenarios(as_json: Json = False) -> None:
     """List the scenarios that come with mjspace."""
-    from mjspace.scenario import loading
+    from mjspace.scenario import files
 
-    found = loading.list_scenarios()
+    found = files.list_scenarios()
     if as_json:
         print(json.dumps(found, indent=2))
         return
@@ -26,6 +26,13 @@ def list_scenarios(as_json: Json = False) -> None:
 def info(
     target: Annotated[str, typer.Argument(metavar="SCENARIO|LOG")],
     overrides: Set = [],  # noqa: B006
+    compiled: Annotated[
+        bool,
+        typer.Option(
+            "--compiled",
+            help="Of a scenario: begin its flight and say what of it is compiled, or why not.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Show a scenario in full, or what a log holds."""
@@ -40,5 +47,11 @@ def info(
         return
     from mjspace.scenario.loading import load, to_toml
 
-    scenario, _ = load(target, overrides)
+    scenario, folder = load(target, overrides)
+    if compiled:
+        from mjspace.simulation.assembly import assemble
+        from mjspace.simulation.loop import what_is_compiled
+
+        print(what_is_compiled(assemble(scenario, folder)))
+        return
     print(scenario.model_dump_json(indent=2) if as_json else to_toml(scenario).rstrip())

@@ -38,9 +38,9 @@ def load(scenario: str | Path, overrides: Iterable[str] = ()) -> Any:
     """Return the ``dm_control.rl.control.Environment`` of a scenario, by name or path.
 
     ``overrides`` are ``"key=value"``, as ``--set`` takes them. Every episode is the same flight,
-    that of member 0, on the stepper of a flight: the scenario's law, flown through the
-    environment, leaves bit for bit the ``/state`` that ``mjspace run`` logs, if it has no inner
-    loop. Another ``seed`` gives other noise.
+    that of member 0, on the stepper of a flight: the commands that a flight logged, as actions,
+    leave bit for bit the ``/state`` of that flight. An action takes the place of the law and of its
+    inner loop, and is held for one control period. Another ``seed`` gives other noise.
 
     Raises:
         InputError: bad input, in one line.

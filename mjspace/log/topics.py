@@ -41,18 +41,6 @@ class DerivedTruth:
     """Velocity of the bus at the crash, shape (3,)."""
 
 
-class AppliedCommand:
-    """The fields of ``/command`` that the actuators add: what they apply of the law's command."""
-
-    wheel_torque: Annotated[Array, Unit("N m")]
-    motor_torque: Annotated[Array, Unit("N m")]
-    thruster_torque: Annotated[Array, Unit("N m")]
-    thruster_thrust: Annotated[Array, Unit("N")]
-    magnetic_moment: Annotated[Array, Unit("A m^2")]
-    engine: Annotated[Array, Unit("N m, N m, N")]
-    """Torques of the two gimbal motors, thrust."""
-
-
 class Disturbance:
     """The fields of ``/disturbance``: the environment's total on the vehicle."""
 
@@ -64,13 +52,11 @@ DECLARED: Mapping[str, tuple[type, ...]] = {
     "/truth": (Truth, DerivedTruth),
     "/measurement": (Measurement,),
     "/reference": (Reference, Trajectory),
-    "/command": (
-        TorqueCommand, VoltageCommand, GimbalRateCommand, ThrustCommand, PulseCommand,
-        AppliedCommand,
-    ),
+    "/command": (TorqueCommand, VoltageCommand, GimbalRateCommand, ThrustCommand, PulseCommand),
     "/disturbance": (Disturbance,),
-}  # fmt: skip
-"""Classes that declare the fields of each topic; a law's own may declare more."""
+}
+"""Classes that declare the fields of each topic; a law's own may declare more, and so do the
+actuators for what they apply and measure."""
 
 
 def units(kinds: Mapping[str, type] = {}) -> dict[str, dict[str, Unit]]:

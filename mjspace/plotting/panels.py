@@ -1,15 +1,14 @@
 """The panels of a page: one for each signal that has something to show."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mjspace.contract import Array
 from mjspace.log import topics
 from mjspace.log.reader import Log
-from mjspace.plotting.decimate import outline
+from mjspace.plotting.decimate import Line, outlines
 from mjspace.signals import find_signal
 from mjspace.units import Unit
 
@@ -27,6 +26,7 @@ class Panel:
     topic: str
     field: str
     quantity: Unit = NO_UNIT
+    """Of the field, as the log has it; ``read`` fills it in."""
     part: slice | None = None
     """The one component that is drawn; all when left out."""
     names: str = ""
@@ -59,54 +59,63 @@ class Curves:
     desired: Array | None = None
 
 
-def _standard(title: str, topic: str, field: str, **drawn: Any) -> Panel:
-    return Panel(title, topic, field, DECLARED[topic][field], **drawn)
-
-
 STANDARD = (
-    _standard("Attitude error", "/truth", "attitude_error", log_scale=True),
-    _standard("Body rate", "/truth", "rate", names="xyz", desired=DESIRED_RATE),
-    _standard("Commanded torque on the bus", "/command", "torque", names="xyz"),
-    _standard("Wheel motor torque", "/command", "wheel_torque"),
-    _standard("Motor torque", "/command", "motor_torque"),
-    _standard("Gimbal angle", "/truth", "gimbal_angle"),
-    _standard("Gimbal rate", "/truth", "gimbal_rate", desired=("/command", "gimbal_rate")),
-    _standard("Wheel speed", "/truth", "wheel_speed"),
-    _standard("Change of total momentum", "/truth", "momentum", log_scale=True, drift=True),
-    _standard("Disturbance torque about the centre of mass", "/disturbance", "torque", names="xyz"),
+    Panel("Attitude error", "/truth", "attitude_error", log_scale=True),
+    Panel("Body rate", "/truth", "rate", names="xyz", desired=DESIRED_RATE),
+    Panel("Commanded torque on the bus", "/command", "torque", names="xyz"),
+    Panel("Wheel motor torque", "/command", "wheel_torque"),
+    Panel("Motor torque", "/command", "motor_torque"),
+    Panel("Gimbal angle", "/truth", "gimbal_angle"),
+    Panel("Gimbal rate", "/truth", "gimbal_rate", desired=("/command", "gimbal_rate")),
+    Panel("Wheel speed", "/truth", "wheel_speed"),
+    Panel("Change of total momentum", "/truth", "momentum", log_scale=True, drift=True),
+    Panel("Disturbance torque about the centre of mass", "/disturbance", "torque", names="xyz"),
 )
 
 
-def curves(log: Log) -> Iterator[Curves]:
-    """Yield the curves of the standard page: its signals, and the first of the law's that change.
+def curves(log: Log) -> list[Curves]:
+    """Return the curves of the standard page: its signals, and the first of the law's that change.
 
     A signal that is zero throughout is left out, and so is one of the law's that never changes.
     """
-    for panel in STANDARD:
-        if log.topics.get(panel.topic, {}).get(panel.field, (0,)) != (0,):
-            found = read(log, panel)
-            if found.value.any():
-                yield found
-    shown = 0
-    for field in log.topics.get("/law", {}):
-        found = read(log, _of_signal(log, f"law.{field}"))
-        if shown < LAW_PANELS and np.ptp(found.value, axis=0).any():
-            shown += 1
-            yield found
+    standard = [
+        panel
+        for panel in STANDARD
+        if log.topics.get(panel.topic, {}).get(panel.field, (0,)) != (0,)
+    ]
+    law = [_of_signal(log, f"law.{field}") for field in log.topics.get("/law", {})]
+    found = read(log, [*standard, *law])
+    shown = [one for one in found[: len(standard)] if one.value.any()]
+    changing = [one for one in found[len(standard) :] if np.ptp(one.value, axis=0).any()]
+    return [*shown, *changing[:LAW_PANELS]]
 
 
-def chosen(log: Log, signals: Sequence[str]) -> Iterator[Curves]:
-    """Yield the curves of ``signals``, named as in a check: ``law.theta_hat``, ``truth.rate[0]``.
+def chosen(log: Log, signals: Sequence[str]) -> list[Curves]:
+    """Return the curves of ``signals``, named as in a check: ``law.theta_hat``, ``truth.rate[0]``.
 
     Raises:
         ValueError: the log has no such signal, with the near names.
     """
-    for signal in signals:
-        yield read(log, _of_signal(log, signal))
+    return read(log, [_of_signal(log, signal) for signal in signals])
 
 
-def read(log: Log, panel: Panel) -> Curves:
-    """Return the panel's curves from the log."""
+def read(log: Log, panels: Sequence[Panel]) -> list[Curves]:
+    """Return the panels' curves from the log, which is read once; in its units of their fields."""
+    panels = [replace(panel, quantity=unit(log, panel.topic, panel.field)) for panel in panels]
+    lines = {}
+    for number, panel in enumerate(panels):
+        lines[number, "value"] = Line(panel.topic, panel.field, _change(panel))
+        if panel.desired is not None and panel.desired[1] in log.topics.get(panel.desired[0], {}):
+            lines[number, "desired"] = Line(*panel.desired, _change(panel))
+    found = dict(zip(lines, outlines(log, list(lines.values())), strict=True))
+    return [
+        Curves(panel, *found[number, "value"], *found.get((number, "desired"), ()))
+        for number, panel in enumerate(panels)
+    ]
+
+
+def _change(panel: Panel) -> Callable[[Array], Array]:
+    """Return what makes the panel's values of a field's rows (n, c), which come in their order."""
     first: list[Array] = []
 
     def change(rows: Array) -> Array:
@@ -117,20 +126,17 @@ def read(log: Log, panel: Panel) -> Curves:
             rows = np.linalg.norm(rows - first[0], axis=1, keepdims=True)
         return panel.scale * rows
 
-    time, value = outline(log, panel.topic, panel.field, change)
-    if panel.desired is None or panel.desired[1] not in log.topics.get(panel.desired[0], {}):
-        return Curves(panel, time, value)
-    return Curves(panel, time, value, *outline(log, *panel.desired, change))
+    return change
 
 
 def unit(log: Log, topic: str, field: str) -> Unit:
     """Return the unit that a logged field has, and how it is displayed if that is declared."""
-    si = log.units.get(topic, {}).get(field, "")
     declared = DECLARED.get(topic, {}).get(field, NO_UNIT)
+    si = log.units.get(topic, {}).get(field, declared.si)
     return declared if declared.si == si else Unit(si)
 
 
 def _of_signal(log: Log, signal: str) -> Panel:
     topic, field, part = find_signal(log.topics, signal)
     title = f"Law: {signal.removeprefix('law.')}" if topic == "/law" else signal
-    return Panel(title, topic, field, unit(log, topic, field), part=part)
+    return Panel(title, topic, field, part=part)

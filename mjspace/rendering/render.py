@@ -72,7 +72,7 @@ def nearest_rows(log: Log, topic: str, field: str, times: Array) -> Iterator[Arr
     Raises:
         ValueError: the log does not have the topic or field, or no row near the times.
     """
-    margin = float(log.metadata["control_period"])
+    margin = float(log.metadata["control_period"]) * log.every[topic]
     stamps, rows, done = np.empty(0), np.empty((0, *log.topics[topic][field])), 0
     start, end = max(times[0] - margin, 0.0), times[-1] + margin
     for block in log.blocks(topic, [field], start=start, end=end):
@@ -115,7 +115,9 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
             strict=True,
         ):
             stage.set(float(time), physics, desired, on_time, thrust)
-            yield overlay.write(canvas.draw(stage.scene), left, (f"{time:.2f} s", caption))
+            frame = canvas.draw(stage.scene)
+            overlay.write(frame, left, (f"{time:.2f} s", caption))
+            yield frame
 
 
 def shares_of_thrust(log: Log, engine: Any, times: Array) -> Iterator[float]:

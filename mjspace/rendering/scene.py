@@ -45,7 +45,9 @@ class Stage:
         self._camera.fixedcamid = names.index(camera)
         self._axes = np.flatnonzero(model.geom_group == AXES).tolist()
         self._rotors = model.jnt_qposadr[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]
-        plumes = [mujoco.mj_name2id(model, _GEOM, f"thruster_{i}_plume") for i in range(model.nu)]
+        # On/off thrusters have a plume each, by the motor's name.
+        motors = [model.actuator(index).name for index in range(model.nu)]
+        plumes = [mujoco.mj_name2id(model, _GEOM, f"{motor}_plume") for motor in motors]
         self._plumes = [geom for geom in plumes if geom >= 0]
         self._angle: Array | None = None
         self._orbit = orbit

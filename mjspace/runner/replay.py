@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.contract import REPORTED_BY_PLANT
+from mjspace.contract import REPORTED_BY_PLANT, TICK, Array
 from mjspace.errors import InputError, input_error_at
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.runner.former_names import as_logged, logged_name
 from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
@@ -108,16 +109,14 @@ def verify(
     with assembly_of(log) as assembly:
         begin = start_of(log, assembly, start)
         for block in fly(assembly, begin, [int(log.metadata["member"])]):
-            flown = one_vehicle(block)
+            flown = as_logged(one_vehicle(block), log.topics)
             _check_topics(log, block)
-            logged = {
-                topic: log.read(topic, start=block.time[0], end=block.time[-1]) for topic in flown
-            }
-            found = first_difference(logged, flown)
+            logged = log.read_topics(dict.fromkeys(flown), start=block.time[0], end=block.time[-1])
+            found = first_difference(logged, _as_often(log, logged, flown, block.time))
             if found is not None:
                 return dataclasses.replace(found, reason=_other_streams(log, assembly.scenario))
             progress(float(block.time[-1]))
-            if len(logged["/state"]["time"]) < len(block.time):
+            if block.time[-1] > log.end + TICK:
                 break  # the log ends here: its flight was interrupted
     return None
 
@@ -204,7 +203,14 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     near = (number - 0.5) * period, (number + 0.5) * period
     row = log.read("/state", None, *near)
     if len(row["time"]) != 1:
-        raise InputError(f"t = {time:g} s is not in the log: it has {log.start:g} to {log.end:g} s")
+        if not log.start <= time <= log.end:
+            has = f"{log.start:g} to {log.end:g} s"
+            raise InputError(f"t = {time:g} s is not in the log: it has {has}")
+        found = float(log.nearest("/state", time)["time"])
+        raise InputError(
+            f"t = {time:g} s has no logged state: /state is logged every "
+            f"{log.every['/state'] * period:g} s, and the nearest is at {found:.10g} s"
+        )
     state = {name: values for name, values in row.items() if name != "time"}
     sensors, actuators = (
         {name.removeprefix(kind): v for name, v in state.items() if name.startswith(kind)}
@@ -213,30 +219,43 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     law_state: Any = None
     if not fresh_law:
         absent = dict.fromkeys(REPORTED_BY_PLANT, np.empty((1, 0)))
-        logged = log.read("/measurement", None, *near)
-        measured = {name: values for name, values in logged.items() if name != "time"}
+        # Whichever is logged: the law's state is taken from the log, its names from this one.
+        logged = log.nearest("/measurement", time)
+        measured = {name: values[None] for name, values in logged.items() if name != "time"}
         desired = reference_at(assembly.reference, np.array([number * period]))
         template = assembly.law.reset(
             assembly.sensors([0]).measurement(**absent | measured),
             type(desired)(*(values[0] for values in desired)),
         )
-        names = getattr(template, "_fields", ())
-        missing = [name for name in names if f"law_{name}" not in state]
+        fields = getattr(template, "_fields", ())
+        names = [logged_name(f"law_{field}", state) for field in fields]
+        missing = [field for field, name in zip(fields, names, strict=True) if name not in state]
         if missing:
             raise InputError(f"the log has no state {missing[0]!r} for this law: another flew")
-        law_state = type(template)(*(state[f"law_{name}"] for name in names)) if names else ()
+        law_state = type(template)(*(state[name] for name in names)) if names else ()
     return Start(number, state["physics"], sensors, law_state, actuators)
 
 
 def _check_topics(log: Log, block: Block) -> None:
     """Refuse a log whose topics are not those of the flight again, as of another version."""
-    flown = shapes(block)
+    flown = as_logged(shapes(block), log.topics)
     for topic in flown | log.topics:
         if flown.get(topic) != log.topics.get(topic):
             raise InputError(
                 f"log: {topic} holds {log.topics.get(topic)}, flown again {flown.get(topic)}: "
                 "another version of mjspace wrote it"
             )
+
+
+def _as_often(log: Log, logged: Rows, flown: Rows, time: Array) -> Rows:
+    """Return the rows of ``flown``, at ``time`` (n,) [s], that each topic has ``logged``."""
+    found = {}
+    for topic, fields in flown.items():
+        chosen: Any = slice(None)
+        if log.every[topic] > 1:
+            chosen = np.searchsorted(time, logged[topic]["time"] - TICK)
+        found[topic] = {name: rows[chosen] for name, rows in fields.items()}
+    return found
 
 
 def first_difference(logged: Rows, flown: Rows) -> Difference | None:

@@ -5,7 +5,8 @@ import functools
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, get_args, get_origin
@@ -46,7 +47,8 @@ def construct(
     A parameter that the table leaves out is taken from ``facts`` where they hold its name (the
     vehicle's properties), else from its default; the component as flown has all written out.
     ``file`` gives the rows of a table read from a CSV file with a header of parameter names. A
-    table in a gain that has a ``kind`` is constructed in the same way.
+    table in a gain that has a ``kind`` is constructed in the same way, and so is one for a
+    parameter that is annotated with a dataclass, or a list of it.
 
     Raises:
         ValueError: an unknown, missing or unfit gain, with its name and what would be right.
@@ -57,32 +59,60 @@ def construct(
         if both := sorted(read.keys() & gains.keys()):
             raise ValueError(f"{both[0]}: stands both here and in the file: leave one out")
         gains |= read
+    values, written = _tables_in(kind, gains, facts, folder)
+    built, flown = _build(kind, component.kind, values, written, facts)
+    return built, Component(kind=component.kind, **flown)
+
+
+def _build(
+    kind: type,
+    name_of_kind: str,
+    gains: Mapping[str, Any],
+    written: Mapping[str, Any],
+    facts: Mapping[str, Any],
+) -> tuple[Any, dict[str, Any]]:
+    """Return the object of class ``kind`` and its gains as flown.
+
+    Of the tables in ``gains``, which are constructed already, ``written`` has those as flown.
+    """
     parameters = _parameters(kind)
     for name in gains:
         if name not in parameters:
-            raise ValueError(f"{name}: {component.kind} has no such key{nearest(name, parameters)}")
-    inside = {name: gain for name, gain in gains.items() if _has_kind(gain)}
-    written = {}
-    for name, gain in inside.items():
-        gains[name], written[name] = _within(name, gain, facts, folder)
-    values = {name: facts[name] for name in parameters if name in facts} | gains
+            raise ValueError(f"{name}: {name_of_kind} has no such key{nearest(name, parameters)}")
+    values = {name: facts[name] for name in parameters if name in facts} | dict(gains)
     missing = [
         name
         for name, parameter in parameters.items()
         if parameter.default is parameter.empty and name not in values
     ]
     if missing:
-        raise ValueError(f"{missing[0]}: missing, and {component.kind} has no default for it")
+        raise ValueError(f"{missing[0]}: missing, and {name_of_kind} has no default for it")
     declared = {f.name: f.metadata for f in dataclasses.fields(kind)} if _is_data(kind) else {}
     for name, value in values.items():
         if "unit" in declared.get(name, {}):
             values[name] = _in_si(name, value, declared[name])
         else:
-            _refuse_unlike(name, value, parameters[name].annotation, component.kind)
+            _refuse_unlike(name, value, parameters[name].annotation, name_of_kind)
     refuse_unfit(values, declared)
     built = kind(**values)
-    flown = {name: getattr(built, name, values.get(name)) for name in parameters} | written
-    return built, Component(kind=component.kind, **{k: plain(v) for k, v in flown.items()})
+    flown = {name: plain(getattr(built, name, values.get(name))) for name in parameters}
+    return built, flown | dict(written)
+
+
+def _tables_in(
+    kind: type, gains: Mapping[str, Any], facts: Mapping[str, Any], folder: Path, at: str = ""
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the gains with the tables in them constructed, and those gains as flown.
+
+    ``at`` comes before their keys in messages.
+    """
+    parameters = _parameters(kind)
+    values, written = dict(gains), {}
+    for name, gain in gains.items():
+        table = table_of(parameters[name].annotation) if name in parameters else None
+        if table is not None or _has_kind(gain):
+            values[name], written[name] = _within(f"{at}{name}", gain, table, facts, folder)
+    return values, written
 
 
 def _has_kind(value: Any) -> bool:
@@ -92,31 +122,54 @@ def _has_kind(value: Any) -> bool:
     return isinstance(value, list) and any(map(_has_kind, value))
 
 
-def _within(key: str, value: Any, facts: Mapping[str, Any], folder: Path) -> tuple[Any, Any]:
-    """Return the gain with every table that has a ``kind`` constructed, and as flown."""
+def table_of(annotation: Any) -> type | None:
+    """Return the dataclass of which a parameter with that annotation takes a table, or several."""
+    if isinstance(annotation, type) and _is_data(annotation):
+        return annotation
+    return next(filter(None, map(table_of, get_args(annotation))), None)
+
+
+def _within(
+    key: str, value: Any, table: type | None, facts: Mapping[str, Any], folder: Path
+) -> tuple[Any, Any]:
+    """Return the gain with every table in it constructed, and as flown.
+
+    A table without a ``kind`` is one of the dataclass ``table``, if any.
+    """
     if isinstance(value, list):
-        pairs = [_within(f"{key}.{n}", item, facts, folder) for n, item in enumerate(value)]
+        pairs = [_within(f"{key}.{n}", item, table, facts, folder) for n, item in enumerate(value)]
         return [built for built, _ in pairs], [flown for _, flown in pairs]
     if not isinstance(value, Mapping):
         return value, value
     if "kind" not in value:
-        items = {name: _within(f"{key}.{name}", v, facts, folder) for name, v in value.items()}
+        if table is not None:
+            values, written = _tables_in(table, value, facts, folder, f"{key}.")
+            with _at(key):
+                return _build(table, table.__name__, values, written, facts)
+        items = {n: _within(f"{key}.{n}", v, None, facts, folder) for n, v in value.items()}
         return {n: built for n, (built, _) in items.items()}, {
             n: flown for n, (_, flown) in items.items()
         }
     if not isinstance(value["kind"], str):
         raise ValueError(f"{key}.kind: got {value['kind']!r}, should be text")
     inner = Component.model_validate(value)
-    try:
+    with _at(key):
         if inner.kind.partition(":")[0].endswith(".py"):
             raise ValueError(
                 f"{inner.kind}: a law within another comes from a module, as the log "
                 "keeps the text of one file alone"
             )
         built, flown = construct(inner, load_object(inner.kind, folder), facts, folder)
+    return built, {"kind": flown.kind, **flown.gains}
+
+
+@contextmanager
+def _at(key: str) -> Iterator[None]:
+    """Put the ``key`` before the message of a ValueError."""
+    try:
+        yield
     except ValueError as error:
         raise ValueError(f"{key}: {error}") from error
-    return built, {"kind": flown.kind, **flown.gains}
 
 
 def plain(value: Any) -> Any:

@@ -42,6 +42,11 @@ class Equipment:
         """Whether the table describes anything at all."""
         return True
 
+    @property
+    def rotors(self) -> Any:
+        """Its wheels on the bus, ``vehicle.mass_properties.Rotors``; None where it has none."""
+        return None
+
     def attach(self, spec: Any) -> None:
         """Add its bodies, joints, sites and motors to the vehicle's ``MjSpec``.
 

@@ -2,9 +2,10 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from mjspace.scenario.declared import DeclaredIn, declaration
+from mjspace.scenario.declared import DeclaredIn
+from mjspace.scenario.equipment import Equipment
 from mjspace.scenario.fields import (
     Angles3,
     Finite,
@@ -22,7 +23,6 @@ from mjspace.scenario.fields import (
     Velocity3,
 )
 from mjspace.scenario.hinges import Hinge
-from mjspace.scenario.landing import Ground
 from mjspace.units import whole_number
 
 
@@ -59,20 +59,13 @@ class Part(Table):
 
     @model_validator(mode="after")
     def _deployable(self) -> "Part":
-        if self.deployment is None:
-            return self
-        if self.part not in ("boom", "yo_yo"):
-            raise ValueError(f"deployment: a {self.part} has none, a boom or a yo_yo has")
-        given = self.deployment.length is not None, self.deployment.rate is not None
-        if given != (self.part == "boom",) * 2:
-            raise ValueError("deployment: length and rate are a boom's, which needs both")
+        if self.deployment is not None:
+            self.deployment.check(self.part)
         return self
 
 
 class PlantTable(Table):
     """The vehicle: an assembly from assets/, with its mass properties, parts and actuators."""
-
-    model_config = ConfigDict(defer_build=True)
 
     model: str = "satellite_3rw"
     """Name of a folder in assets/."""
@@ -99,7 +92,7 @@ class PlantTable(Table):
         Annotated[Any, DeclaredIn("mjspace.environment.torque_ripple:Ripple", optional=False)],
     ] = {}
     """Torque ripple of motors, by the hinge."""
-    ground: Ground | None = None
+    ground: Annotated[Any, DeclaredIn("mjspace.vehicle.ground:Ground")] = None
     """What is below it; nothing when left out."""
 
     # The actuators, in the order in which they act and are logged. A line registers each.
@@ -133,11 +126,9 @@ class PlantTable(Table):
 
         A vehicle without anything else has reaction wheels, of which there may be none.
         """
-        declared = [name for name, field in type(self).model_fields.items() if declaration(field)]
-        tables = {name: getattr(self, name) for name in declared}
-        return {n: table for n, table in tables.items() if table is not None and table.fitted} or {
-            "wheels": self.wheels
-        }
+        tables = {name: getattr(self, name) for name in type(self).model_fields}
+        fitted = {n: t for n, t in tables.items() if isinstance(t, Equipment) and t.fitted}
+        return fitted or {"wheels": self.wheels}
 
     @model_validator(mode="after")
     def _beside_each_other(self) -> "PlantTable":

@@ -8,7 +8,7 @@ from pydantic import field_validator, model_validator
 
 from mjspace.contract import Array
 from mjspace.scenario.fields import Finite, Table
-from mjspace.units import any_to_si
+from mjspace.units import to_si
 
 
 class Region(Table):
@@ -25,7 +25,7 @@ class Region(Table):
     @field_validator("below", "above", mode="before")
     @classmethod
     def _quantity(cls, value: Any) -> Any:
-        return any_to_si(value) if isinstance(value, str) else value
+        return to_si(value, None)
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:

@@ -18,16 +18,17 @@ from mjspace.ranges import numbers
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
+from mjspace.scenario.log_rates import LogRates
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
 from mjspace.scenario.sensors import Sensors, check_sensors
-from mjspace.units import any_to_si, whole_number
+from mjspace.units import to_si, whole_number
 
 
 class Component(BaseModel):
     """A law or a reference: ``kind`` names a class, every other key is one of its gains."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="allow", frozen=True)
 
     kind: str
     """``"module:Class"`` in controllers/, or ``"path/to/file.py:Class"`` beside the scenario."""
@@ -55,7 +56,7 @@ class EventTable(SignalRegion):
 
 
 class Check(SignalRegion):
-    """One thing that the flight must show, judged from the log alone."""
+    """One thing that the flight must show, judged on every control period."""
 
     statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
     """Over the window: of the value, or of the norm of a vector; ``peak`` is the largest magnitude,
@@ -113,7 +114,7 @@ class Check(SignalRegion):
         if value is None:
             return None
         items = value if isinstance(value, list | tuple) else [value]
-        found = numbers([any_to_si(item) if isinstance(item, str) else item for item in items])
+        found = numbers(to_si(items, None))
         if found.ndim != 1 or not len(found) or not np.isfinite(found).all():
             raise ValueError(f"got {value!r}, should be a finite number or a list of them")
         return found.tolist() if isinstance(value, list | tuple) else float(found[0])
@@ -146,8 +147,6 @@ class Check(SignalRegion):
 class Scenario(Table):
     """One flight, whole: what flies, where, under which law, how long, and what it must show."""
 
-    model_config = ConfigDict(defer_build=True)
-
     name: str = ""
     """The file's name when left out."""
     description: str
@@ -169,6 +168,7 @@ class Scenario(Table):
     faults: list[Annotated[Any, DeclaredIn("mjspace.actuators.faults:Fault", optional=False)]] = []
     checks: list[Check] = []
     events: list[EventTable] = []
+    log: LogRates = LogRates()
 
     @model_validator(mode="before")
     @classmethod
@@ -212,6 +212,7 @@ class Scenario(Table):
                 whole_number(span, step, key, "rates.physics")
         if not _is_flown(info):
             whole_number(self.duration, self.rates.control, "duration", "rates.control")
+        self.log.every(self.rates.control)
         return self
 
     @model_validator(mode="after")

@@ -46,13 +46,17 @@ ORDERS = np.dtype([
     ("before", *_TABLE), ("after", *_TABLE),
     ("record", _NUMBER), ("period_stride", _NUMBER), ("vehicle_stride", _NUMBER),
     # in the memory: the time [s], the state row, the motors that saturate
-    ("time", _NUMBER), ("state_row", _NUMBER), ("saturated", *_TABLE), ("saturated_record", _NUMBER),
+    ("time", _NUMBER), ("state_row", _NUMBER), ("saturated", *_TABLE),
+    ("saturated_record", _NUMBER),
     # MuJoCo's sensors: in the memory, word of mjData, size
     ("sensors", _NUMBER), ("sensors_word", _NUMBER), ("sensors_size", _NUMBER),
 ])  # fmt: skip
 """What is flown; places in a memory are offsets [bytes], sizes are in bytes."""
 _ORDERS = from_dtype(ORDERS)
 _POINTER, _INT = ir.IntType(8).as_pointer(), ir.IntType(32)
+
+
+_intrinsic: Any = intrinsic
 
 
 def _call(builder: Any, address: Any, pointers: Any, *others: Any) -> Any:
@@ -62,7 +66,7 @@ def _call(builder: Any, address: Any, pointers: Any, *others: Any) -> Any:
     return builder.call(function, [*(builder.inttoptr(p, _POINTER) for p in pointers), *others])
 
 
-@intrinsic
+@_intrinsic
 def _step(context: Any, function: Any, model: Any, data: Any) -> Any:
     """Call ``mj_step`` or ``mj_forward``."""
 
@@ -73,7 +77,7 @@ def _step(context: Any, function: Any, model: Any, data: Any) -> Any:
     return types.void(*[types.int64] * 3), generate
 
 
-@intrinsic
+@_intrinsic
 def _get_state(context: Any, function: Any, model: Any, data: Any, row: Any, state: Any) -> Any:
     """Call ``mj_getState``."""
 
@@ -84,7 +88,7 @@ def _get_state(context: Any, function: Any, model: Any, data: Any, row: Any, sta
     return types.void(*[types.int64] * 5), generate
 
 
-@intrinsic
+@_intrinsic
 def _address(context: Any, memory: Any) -> Any:
     """Return a pointer as a number."""
 
@@ -154,9 +158,7 @@ def _fly(
                     ever[i] = max(ever[i], saturated[i])
             _step(orders.step if flown else orders.forward, model, data)
             if step == 0:
-                copy_bytes(
-                    base + orders.sensors, fields[orders.sensors_word], orders.sensors_size
-                )
+                copy_bytes(base + orders.sensors, fields[orders.sensors_word], orders.sensors_size)
                 _copy(record, base, after)
             if acting:
                 _copy(base, base, after_driving)

@@ -2,25 +2,24 @@
 
 import time as clock
 import warnings
-from dataclasses import fields
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from mujoco.batch import SimulationError
 
-from mjspace.contract import DesiredMotion
+from mjspace.contract import Array, DesiredMotion
+from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compiled_flight import CompiledFlight
-from mjspace.simulation.compiled_period import compile_period
+from mjspace.simulation.compiled_period import CompiledPeriod, compile_period
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import Start
-from mjspace.simulation.recording import Columns
+from mjspace.simulation.recording import OF_THE_LAW, Columns, Recording
 from mjspace.simulation.stepper import Stepper
 from mjspace.tracing.inner_loops import Untraceable
-
-_FIRST_PERIODS = 100
-"""Of the first block, from which the time that a period takes is learnt."""
+from mjspace.vehicle.step_effect import State
 
 
 class CompiledBlocks:
@@ -28,7 +27,8 @@ class CompiledBlocks:
 
     Attributes:
         on: whether the next block's inside is compiled.
-        reason: why it is not.
+        reason: why it is not, or why sensors and law are not; "" where all is.
+        seconds: wall time of a period of the last block [s]; 0 before the first.
     """
 
     def __init__(
@@ -36,14 +36,20 @@ class CompiledBlocks:
     ) -> None:
         self._assembly, self._start, self._threads = assembly, start, threads
         self._stepper, self._law = stepper, law
+        self._period: CompiledPeriod
         self._flight: CompiledFlight | None = None
-        self._seconds = 0.0
-        self.reason = ", ".join(effect.name for effect in stepper.effects)
-        self.on = not self.reason
+        self.seconds = 0.0
+        effects = " and ".join(effect.name for effect in stepper.effects)
+        self.reason = f"{effects} can act between compiled steps in Python alone" if effects else ""
+        self.on = not effects
 
-    def periods_in(self, seconds: float) -> int:
-        """Return about how many periods are flown in so many seconds of wall time."""
-        return max(2, int(seconds / self._seconds)) if self._seconds else _FIRST_PERIODS
+    def __str__(self) -> str:
+        """Return what is compiled, in one line."""
+        if not self.on:
+            return f"flown in Python: {self.reason}"
+        if self.reason:
+            return f"actuators compiled; sensors and law called in Python: {self.reason}"
+        return "compiled: sensors, law and actuators"
 
     def fly(
         self,
@@ -52,27 +58,30 @@ class CompiledBlocks:
         count: int,
         last: int,
         desired: DesiredMotion,
+        stop: Callable[[], bool],
     ) -> Columns:
-        """Return the columns of ``count`` periods, of which Python has flown the ``first``.
+        """Return the columns of up to ``count`` periods, of which Python has flown the ``first``.
 
         ``columns`` are that period's. Where the compiled block cannot be had, or differs from them
         or in the state that they lead to, they are returned, and Python flies on.
         """
         began = clock.monotonic()
+        after = self._after_a_period()
         try:
             flight = self._flight or self._compile(first, desired)
-        except Untraceable as error:
-            return self._off(str(error), columns)
-        flight.set(first.physics, first.memory, first.law)
-        try:
-            compiled = flight.fly(first.number, count, last, desired)
-        except SimulationError as error:
-            return self._off(str(error), columns)
+            flight.set(first.physics, first.memory, first.law)
+            flight.begin(first.number, count, last, desired)
+            if self._period.has_law:
+                flight.fly(count)
+                compiled = flight.columns()
+            else:
+                compiled = self._fly_law_in_python(flight, first, count, desired, stop)
+        except (Untraceable, SimulationError, FlightError) as error:
+            return self._off(str(error), columns, after)  # Python meets the same error, and reports
         if flight.warned:
-            return self._off("MuJoCo warned", columns)  # and Python finds out of what
-        after = self._stepper.batch.state
+            return self._off("MuJoCo warned", columns, after)
         different = _difference(columns, compiled)
-        if not different and compiled.physics[1].tobytes() != after.tobytes():
+        if not different and compiled.physics[1].tobytes() != after.physics.tobytes():
             different = "the state after a period"
         if different:
             warnings.warn(
@@ -81,48 +90,96 @@ class CompiledBlocks:
                 RuntimeWarning,
                 stacklevel=2,
             )
-            return self._off(f"{different} differs from Python's", columns)
-        after[...] = flight.physics
-        self._stepper.memory = {name: values.copy() for name, values in flight.memory.items()}
-        self._law.state = type(flight.law)(*(values.copy() for values in flight.law))
-        self._seconds = (clock.monotonic() - began) / count
+            return self._off(f"{different} differs from Python's", columns, after)
+        self._take(flight)
+        if self._period.has_law:
+            kind: Any = type(flight.law)
+            kept = [values.copy() for values in flight.law]
+            self._law.state = kind(*kept) if kept else ()
+        self.seconds = (clock.monotonic() - began) / len(compiled)
         return compiled
 
+    def _fly_law_in_python(
+        self,
+        flight: CompiledFlight,
+        first: ControlPeriod,
+        count: int,
+        desired: DesiredMotion,
+        stop: Callable[[], bool],
+    ) -> Columns:
+        """Fly the block with the law, and the sensors, called in each period."""
+        recording = Recording(first, count, OF_THE_LAW)
+        flight.fly(1, first.command)
+        recording.write(first)
+        rows: Any = zip(*(array[1:count] for array in desired), strict=True)
+        for number, row in enumerate(rows, first.number + 1):
+            self._take(flight)
+            period = self._stepper.sense(number)
+            period.law, period.command, period.signals = self._law.step(
+                period.time, period.measurement, type(desired)(*row)
+            )
+            flight.fly(1, period.command)
+            recording.write(period)
+            if stop():
+                break
+        of_law, columns = recording.columns(), flight.columns()
+        return Columns(of_law.groups | columns.groups, [], of_law.kinds)
+
+    def _take(self, flight: CompiledFlight) -> None:
+        """Put the stepper where the compiled flight is."""
+        self._stepper.batch.state[...] = flight.physics
+        self._stepper.memory = {name: values.copy() for name, values in flight.memory.items()}
+
     def _compile(self, example: ControlPeriod, desired: DesiredMotion) -> CompiledFlight:
-        layout, reference = self._stepper.layout, type(desired)(*(each[0] for each in desired))
-        period = compile_period(
-            self._assembly, layout, example, reference, example.sensordata.shape[-1]
+        """Return the compiled flight, of the law too if that can be.
+
+        Raises:
+            Untraceable: not even the actuators can be compiled.
+        """
+        arguments = self._assembly, self._stepper.layout, example
+        reference = type(desired)(*(each[0] for each in desired))
+        try:
+            self._period = compile_period(*arguments, reference, law=True)
+        except Untraceable as error:
+            self.reason = str(error)
+            self._period = compile_period(*arguments, reference, law=False)
+        self._flight = CompiledFlight(
+            self._assembly, self._stepper.layout, self._period, self._start, self._threads
         )
-        self._flight = CompiledFlight(self._assembly, layout, period, self._start, self._threads)
         return self._flight
 
-    def _off(self, reason: str, columns: Columns) -> Columns:
+    def _after_a_period(self) -> "_After":
+        stepper = self._stepper
+        return _After(stepper.batch.state.copy(), stepper.memory, stepper.sensors, self._law.state)
+
+    def _off(self, reason: str, columns: Columns, after: "_After") -> Columns:
+        """Let Python fly on from ``after`` the first period."""
         self.on, self.reason, self._flight = False, reason, None
+        stepper = self._stepper
+        stepper.batch.state[...] = after.physics
+        stepper.memory, stepper.sensors, self._law.state = after[1:]
         return columns
+
+
+class _After(NamedTuple):
+    """What a flight goes on from after the first period of a block."""
+
+    physics: Array
+    memory: State
+    sensors: State
+    law: Any
 
 
 def _difference(one: Columns, other: Columns) -> str:
     """Return the name of the first field whose first rows differ in any bit; "" for none."""
-    for field in fields(Columns):
-        name = field.name
-        mine, others = _named(getattr(one, name)), _named(getattr(other, name))
-        if name in ("events", "kinds"):
-            continue
-        if mine.keys() != others.keys():
-            return f"{name} ({', '.join(mine.keys() ^ others.keys())})"
-        for key, values in mine.items():
-            if _bits(values[:1]) != _bits(others[key][:1]):
-                return f"{name} {key}".rstrip()
+    for group in sorted(one.groups.keys() | other.groups.keys()):
+        if one[group].keys() != other[group].keys():
+            return f"{group} ({', '.join(one[group].keys() ^ other[group].keys())})"
+        for name, values in one[group].items():
+            if _bits(values[:1]) != _bits(other[group][name][:1]):
+                return f"{group} {name}".rstrip()
     return ""
 
 
-def _named(value: Any) -> dict[str, Any]:
-    if isinstance(value, dict):
-        return value
-    if isinstance(value, tuple):
-        return {str(index): each for index, each in enumerate(value)}
-    return {} if value is None else {"": value}
-
-
-def _bits(values: Any) -> tuple[tuple[int, ...], bytes]:
-    return np.shape(values), np.asarray(values, dtype=float).tobytes()
+def _bits(values: Array) -> tuple[tuple[int, ...], bytes]:
+    return values.shape, np.asarray(values, dtype=float).tobytes()

@@ -26,6 +26,7 @@ class CompiledFlight:
         physics: MuJoCo's integration state of each, (N, nstate).
         memory: what the actuators remember, by name, (N, ...).
         law: the law's state, a named tuple of arrays (N, ...), or empty.
+        command: the law's command, arrays (N, ...), where the period begins with it.
     """
 
     def __init__(
@@ -42,18 +43,21 @@ class CompiledFlight:
         self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model)
         self._suite = assembly.sensors([0])
         self.physics = self._batch.state
-        remembered = [*period.memory.values(), *period.law]
+        made = () if period.has_law else period.command
+        remembered = [*period.memory.values(), *period.law, *made]
         places, size = _packed(remembered)
         self._rows = np.zeros((vehicles, size), np.uint8)
         views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
-        count = len(period.memory)
-        self.memory = dict(zip(period.memory, views[:count], strict=True))
-        self.law = type(period.law)(*views[count:]) if period.law else ()
+        self.memory = dict(zip(period.memory, views, strict=False))
+        views = views[len(period.memory) :]
+        self.law = type(period.law)(*views[: len(period.law)]) if period.law else ()
+        self.command = views[len(period.law) :]
         self._record_places, self._record_size = _packed(
             [*(each.array for each in (*period.before, *period.after)), period.saturated]
         )
         self._tables: list[np.ndarray] = []
         self._orders = self._constant_orders(remembered, places)
+        self._function = block_function().address
 
     def set(self, physics: Array, memory: dict[str, Array], law: Any) -> None:
         """Put the vehicles there, with what is remembered."""
@@ -63,61 +67,66 @@ class CompiledFlight:
         for target, values in zip(self.law, law, strict=True):
             target[...] = values
 
-    def fly(self, first: int, count: int, last: int, desired: DesiredMotion) -> Columns:
-        """Fly ``count`` periods from number ``first`` on; the flight's ``last`` is not flown.
+    def begin(self, first: int, count: int, last: int, desired: DesiredMotion) -> None:
+        """Begin a block of ``count`` periods from number ``first`` on.
 
-        ``desired`` has a row for each. A warning of MuJoCo's is left to be found in ``warned``.
+        The flight's ``last`` is not flown. ``desired`` has a row for each period.
+        """
+        self._first, self._flown = first, 0
+        self._recorded = np.empty((count, len(self.physics), self._record_size), np.uint8)
+        orders = self._orders
+        orders["last"] = last
+        orders["period_stride"], orders["vehicle_stride"] = self._recorded.strides[:2]
+        self._desired = [np.ascontiguousarray(rows[:count]) for rows in desired]
+
+    def fly(self, count: int, command: Any = None) -> None:
+        """Fly the next ``count`` periods of the block; one, where the ``command`` is the law's.
+
+        A warning of MuJoCo's is left to be found in ``warned``.
 
         Raises:
             mujoco.batch.SimulationError: MuJoCo raised an error.
         """
-        period, vehicles = self._period, len(self.physics)
-        records = np.empty((count, vehicles, self._record_size), np.uint8)
-        references = [np.ascontiguousarray(rows[:count]) for rows in desired]
-        inputs = _table(
-            (self._offset(to), of.ctypes.data, of.strides[0], of.strides[0])
-            for to, of in zip(period.reference, references, strict=True)
-        )
         orders = self._orders
-        orders["first"], orders["count"], orders["last"] = first, count, last
-        orders["inputs"] = inputs.ctypes.data, len(inputs)
-        orders["record"] = records.ctypes.data
-        orders["period_stride"], orders["vehicle_stride"] = records.strides[:2]
-        self._batch.apply(block_function().address, orders.ctypes.data)
-        return self._columns(records)
+        if self._period.has_law:
+            inputs = _table(
+                (self._offset(to), of[self._flown :].ctypes.data, of.strides[0], of.strides[0])
+                for to, of in zip(self._period.reference, self._desired, strict=True)
+            )
+            orders["inputs"] = inputs.ctypes.data, len(inputs)
+        else:
+            for target, values in zip(self.command, command, strict=True):
+                target[...] = values
+        orders["first"], orders["count"] = self._first + self._flown, count
+        orders["record"] = self._recorded.ctypes.data + self._flown * self._recorded.strides[0]
+        self._batch.apply(self._function, orders.ctypes.data)
+        self._flown += count
 
     @property
     def warned(self) -> bool:
         """Whether MuJoCo has warned of anything."""
         return bool(self._batch.warning[:, :, 1].any())
 
-    def _columns(self, records: np.ndarray) -> Columns:
-        """Return what the ``records`` hold, (n, N, bytes), as views of them."""
-        period = self._period
-        groups: dict[str, dict[str, Array]] = {}
-        recorded = (*period.before, *period.after)
-        for place, each in zip(self._record_places, recorded, strict=False):
+    def columns(self) -> Columns:
+        """Return what the block has recorded so far, as views; without the law, if it has none."""
+        period, records = self._period, self._recorded[: self._flown]
+        names = ("memory", "command", "applied", "wrench")
+        groups: dict[str, dict[str, Array]] = {name: {} for name in names}
+        recorded = (*period.before, *period.after, Recorded("saturated", "", period.saturated))
+        for place, each in zip(self._record_places, recorded, strict=True):
             values = _view(records, place, each.array)
-            if values.size or each.group in ("memory", "applied"):
-                groups.setdefault(each.group, {})[each.name] = np.asarray(values, float)
-        physics, memory = groups["physics"][""], groups.get("memory", {})
-        truth = truth_of(physics, memory, self._layout, self._assembly.actuators, ())
-        _, measurement = self._suite.sample({}, 0, truth)
-        return Columns(
-            physics=physics,
-            sensordata=groups["sensordata"][""],
-            memory=memory,
-            sensors={},
-            measurement={n: a for n, a in measurement._asdict().items() if a.size},
-            law=groups.get("law", {}),
-            command=groups.get("command", {}),
-            signals=groups.get("signals", {}),
-            applied=tuple(groups.get("applied", {}).values()),
-            saturated=_view(records, self._record_places[-1], period.saturated),
-            wrench=None,
-            events=[],
-            kinds=period.kinds,
-        )
+            if values.size or each.group not in ("law", "command", "signals"):
+                kept = values if values.dtype == float else values.astype(float)
+                groups.setdefault(each.group, {})[each.name] = kept
+        if period.has_law:
+            state, memory = groups["physics"][""], groups["memory"]
+            truth = truth_of(state, memory, self._layout, self._assembly.actuators, ())
+            _, measurement = self._suite.sample({}, 0, truth)
+            measured = {name: a for name, a in measurement._asdict().items() if a.size}
+            groups |= {"sensors": {}, "measurement": measured}
+            for name in ("law", "signals"):
+                groups.setdefault(name, {})
+        return Columns(groups, [], period.kinds)
 
     def _constant_orders(self, remembered: Sequence[np.ndarray], places: Sequence[int]) -> Any:
         """Return the orders with all that is the same in every block."""
@@ -155,8 +164,8 @@ class CompiledFlight:
                 )
                 for driven, values in zip(drives, period.applied, strict=True)
             ),
-            "before": self._records(period.before, self._record_places),
-            "after": self._records(period.after, self._record_places[len(period.before) :]),
+            "before": self._record_table(period.before, self._record_places),
+            "after": self._record_table(period.after, self._record_places[len(period.before) :]),
         }
         for name, table in tables.items():
             table = np.ascontiguousarray(table)
@@ -178,7 +187,7 @@ class CompiledFlight:
     def _copies(self, pairs: Copies) -> np.ndarray:
         return _table((self._offset(to), self._offset(of), to.nbytes) for to, of in pairs)
 
-    def _records(self, recorded: Sequence[Recorded], places: Sequence[int]) -> np.ndarray:
+    def _record_table(self, recorded: Sequence[Recorded], places: Sequence[int]) -> np.ndarray:
         return _table(
             (place, self._offset(each.array), each.array.nbytes)
             for each, place in zip(recorded, places, strict=False)

@@ -1,4 +1,4 @@
-"""A control period taken down as a program: sensors, law, inner loop and actuators.
+"""A control period taken down as a program: law, inner loop and actuators, or actuators alone.
 
 The Python code of a period is called once, on traced arrays. What it computes is then a list of
 calls of NumPy's loops on one memory, which a compiled function repeats without Python.
@@ -15,6 +15,7 @@ from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
+from mjspace.simulation.hidden_memory import copied, refuse_hidden_memory
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
@@ -56,6 +57,10 @@ class CompiledPeriod:
     """What the actuators remember, (1, ...)."""
     law: Any
     """The law's state, a named tuple of arrays (1, ...), or empty."""
+    command: Any
+    """The law's command, a named tuple of arrays (1, ...)."""
+    has_law: bool
+    """Whether the program makes the command; else it is made elsewhere, as its input."""
     after_sensing: Copies
     after_driving: Copies
     applied: tuple[np.ndarray, ...]
@@ -75,23 +80,23 @@ def compile_period(
     layout: StateLayout,
     example: ControlPeriod,
     reference: DesiredMotion,
-    sensordata: int,
+    *,
+    law: bool,
 ) -> CompiledPeriod:
     """Return the program of a period like the ``example``, at which ``reference`` is desired.
 
-    ``sensordata`` is how many numbers MuJoCo's sensors report.
+    Without ``law`` it begins with the law's command.
 
     Raises:
         Untraceable: the law or an actuator does what cannot be taken down, and where.
     """
     try:
         with np.errstate(all="ignore"):
-            return _Tracing(assembly, layout, example, reference, sensordata).compiled()
+            tracing = _Tracing(assembly, layout, example, reference)
+            return tracing.with_law() if law else tracing.of_command(example.command)
     except FlightError as error:
-        # A part's exceptions are reported with their place; this one's was ours.
-        if isinstance(error.__cause__, Untraceable):
-            raise Untraceable(str(error)) from error
-        raise Untraceable(f"it does not fly on traced arrays: {error}") from error
+        # Says which actuator, and where.
+        raise Untraceable(str(error)) from error
 
 
 class _Tracing:
@@ -103,77 +108,116 @@ class _Tracing:
         layout: StateLayout,
         example: ControlPeriod,
         reference: DesiredMotion,
-        sensordata: int,
     ) -> None:
         self.assembly, self.layout = assembly, layout
         self.program = program = Program()
         self.time = program.copied(example.time)
         self.physics = program.copied(example.physics[:1])
-        self.sensordata = program.copied(np.zeros((1, sensordata)))
+        self.sensordata = program.copied(example.sensordata[:1])
         self.reference = type(reference)(*map(program.copied, reference))
         self.memory = {name: self._held(array) for name, array in example.memory.items()}
         self.law_state = _tuple_like(example.law, map(self._held, example.law))
         self.inputs = [self.time, self.physics, *self.memory.values(), *self.law_state]
         self.inputs += self.reference
         self.suite = assembly.sensors([0])
-        if self.suite.ticks:
-            raise Untraceable("the sensors err, or sample at times of their own")
+        law = assembly.law
+        self.written_law: Any = law.law if isinstance(law, UnbatchedLaw) else law
 
-    def compiled(self) -> CompiledPeriod:
-        assembly, program = self.assembly, self.program
-        with program.section() as sensing:
+    def with_law(self) -> CompiledPeriod:
+        """Return the program of sensors, law and actuators.
+
+        Raises:
+            Untraceable: as ``compile_period``; or the sensors err.
+        """
+        self.law = copied(self.written_law)
+        if self.suite.ticks:
+            raise Untraceable("sensors err, or sample at times of their own")
+        with self.program.section() as sensing:
             measurement = self._measured(self._truth())
             state, command, signals = self._law_step(measurement)
             state = self._next(self.law_state, state)
-            numbers = [self._numbers(command), self._numbers(signals)]
-        prove(sensing[0], program.memory)
-        after_sensing = _changes(self.law_state, state)
-        law, command_arrays, signal_arrays = self.law_state, *numbers
-        for target, source in after_sensing:
+            command, signals = self._numbers(command), self._numbers(signals)
+        prove(sensing[0], self.program.memory)
+        changes = _changes(self.law_state, state)
+        for target, source in changes:
             target[...] = source
-        with program.section() as driving:
-            truth = self._truth()
-            motors = _tuple_like(command, map(self._traced, command_arrays))
-            inner: Any = law
-            if assembly.inner:
+        recorded = [*_recorded("law", self.law_state), *_recorded("signals", signals)]
+        return self._compiled(
+            command,
+            sensing=sensing[0],
+            after_sensing=changes,
+            recorded=recorded,
+            kinds={"law": type(self.law_state), "signals": type(signals)},
+        )
+
+    def of_command(self, command: Any) -> CompiledPeriod:
+        """Return the program of the actuators under the law's ``command``.
+
+        Raises:
+            Untraceable: as ``compile_period``; or the law has an inner loop.
+        """
+        if self.assembly.inner:
+            raise Untraceable("the law has an inner loop")
+        if any(tick % self.assembly.scenario.rates.steps for tick in self.suite.ticks):
+            raise Untraceable("sensors sample between control instants")
+        with self.program.section() as nothing:
+            pass
+        held = (self._held(np.asarray(each, float)) for each in command)
+        return self._compiled(
+            _tuple_like(command, held),
+            sensing=nothing[0],
+            after_sensing=[],
+            recorded=[],
+            kinds={},
+        )
+
+    def _compiled(
+        self,
+        command: Any,
+        *,
+        sensing: Calls,
+        after_sensing: Copies,
+        recorded: list[Recorded],
+        kinds: dict[str, type],
+    ) -> CompiledPeriod:
+        """Return the program that goes on with the actuators; ``recorded`` is of the law."""
+        own = tuple(self.memory.values())
+        with self.program.section() as driving:
+            truth, motors, inner = self._truth(), self._all_traced(command), self.law_state
+            if self.assembly.inner:
                 inner, motors = self._law_inner(motors, self._measured(truth))
-                inner = self._next(law, inner)
-            memory, applied, saturated = assembly.actuators.act(
-                self._all_traced_memory(), motors, truth, assembly.hold
+                inner = self._next(self.law_state, inner)
+            memory, applied, saturated = self.assembly.actuators.act(
+                self._all_traced_memory(), motors, truth, self.assembly.hold
             )
             outputs = self._numbers(applied)
-            (cut,) = self._numbers([saturated])
-            own = tuple(self.memory.values())
+            (cut,) = self._numbers((saturated,))
             remembered = self._next(own, tuple(memory[name] for name in self.memory))
-        prove(driving[0], program.memory)
-        after_driving = _changes(law, inner) + _changes(own, remembered)
-        recorded = [Recorded("physics", "", self.physics)]
-        recorded += [Recorded("memory", name, array) for name, array in self.memory.items()]
-        named = (("law", law, law), ("command", command, command_arrays))
-        for group, names, arrays in (*named, ("signals", signals, signal_arrays)):
-            recorded += [
-                Recorded(group, name, array)
-                for name, array in zip(getattr(names, "_fields", ()), arrays, strict=True)
-            ]
+        prove(driving[0], self.program.memory)
+        before = [Recorded("physics", "", self.physics)]
+        before += [Recorded("memory", name, array) for name, array in self.memory.items()]
+        before += [*recorded, *_recorded("command", command)]
         after = [Recorded("sensordata", "", self.sensordata)]
         after += [Recorded("applied", str(index), array) for index, array in enumerate(outputs)]
         return CompiledPeriod(
-            program=program,
-            sensing=sensing[0],
+            program=self.program,
+            sensing=sensing,
             driving=driving[0],
             time=self.time,
             physics=self.physics,
             sensordata=self.sensordata,
             reference=self.reference,
             memory=self.memory,
-            law=law,
+            law=self.law_state,
+            command=command,
+            has_law="law" in kinds,
             after_sensing=after_sensing,
-            after_driving=after_driving,
+            after_driving=_changes(self.law_state, inner) + _changes(own, remembered),
             applied=outputs,
             saturated=cut,
-            before=recorded,
+            before=before,
             after=after,
-            kinds={"law": type(law), "command": type(command), "signals": type(signals)},
+            kinds=kinds | {"command": type(command)},
         )
 
     def _truth(self) -> Any:
@@ -187,18 +231,19 @@ class _Tracing:
         return measurement
 
     def _law_step(self, measurement: Any) -> tuple[Any, Any, Any]:
-        law: Any = self.assembly.law
-        step = law.step_of_one if isinstance(law, UnbatchedLaw) else law.step
+        unbatched = isinstance(self.assembly.law, UnbatchedLaw)
+        step = UnbatchedLaw(self.law).step_of_one if unbatched else self.law.step
         state, reference = self._all_traced(self.law_state), self._all_traced(self.reference)
         with _of_the_law():
             after, command, signals = step(state, self._traced(self.time), measurement, reference)
+        refuse_hidden_memory(self.law, self.written_law)
         return after or (), command, signals or ()
 
     def _law_inner(self, command: Any, measurement: Any) -> tuple[Any, Any]:
-        law: Any = self.assembly.law
         state = self._all_traced(self.law_state)
         with _of_the_law():
-            after, motors = law.inner(state, self._traced(self.time), command, measurement)
+            after, motors = self.law.inner(state, self._traced(self.time), command, measurement)
+        refuse_hidden_memory(self.law, self.written_law)
         return after or (), motors
 
     def _held(self, array: Any) -> np.ndarray:
@@ -243,13 +288,16 @@ class _Tracing:
             return value.array
         return value.copy().array
 
-    def _numbers(self, values: Any) -> tuple[np.ndarray, ...]:
-        """Return results as float64 in arrays that nothing else changes."""
-        return tuple(
-            self._own(value.astype(float))
-            if isinstance(value, TracedArray) and value.dtype != float
-            else self._own(value)
-            for value in values
+    def _numbers(self, values: Any) -> Any:
+        """Return results, a tuple, as float64 in arrays that nothing else changes."""
+        return _tuple_like(
+            values,
+            (
+                self._own(value.astype(float))
+                if isinstance(value, TracedArray) and value.dtype != float
+                else self._own(value)
+                for value in values
+            ),
         )
 
 
@@ -260,6 +308,12 @@ def _of_the_law() -> Iterator[None]:
         yield
     except Exception as error:
         raise Untraceable(f"{error} ({place_of(error)})") from error
+
+
+def _recorded(group: str, arrays: Any) -> list[Recorded]:
+    """Return the fields of a named tuple, which may be empty."""
+    names = getattr(arrays, "_fields", ())
+    return [Recorded(group, name, array) for name, array in zip(names, arrays, strict=True)]
 
 
 def _tuple_like(example: Any, values: Any) -> Any:

@@ -3,8 +3,9 @@
 from typing import Any
 
 from mjspace.contract import DesiredMotion, Law, Measurement
-from mjspace.errors import FlightError, failure
+from mjspace.errors import failure
 from mjspace.simulation.user_code import (
+    ReturnError,
     check_inner,
     check_same_shapes,
     check_state,
@@ -46,7 +47,7 @@ class FlownLaw:
                 self.state = read_only(state or ())
             before = self.state
             returned = self._law.step(before, time, measurement, reference)
-        except FlightError:
+        except ReturnError:
             raise
         except Exception as error:
             raise failure("the law", error) from error

@@ -15,13 +15,22 @@ from mjspace.simulation.compiled_blocks import CompiledBlocks
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.events import with_declared_events
 from mjspace.simulation.flown_law import FlownLaw
-from mjspace.simulation.initial_state import Start, last_period
-from mjspace.simulation.recording import Block, Columns, block_of, columns_of, until_trouble
+from mjspace.simulation.initial_state import Start, first_start, last_period
+from mjspace.simulation.recording import (
+    OF_THE_LAW,
+    OF_THE_VEHICLE,
+    Block,
+    Columns,
+    Recording,
+    block_of,
+    until_trouble,
+)
 from mjspace.simulation.stepper import Stepper
 from mjspace.simulation.user_code import reference_at
 
 BLOCK_PERIODS = 2000
 BLOCK_BYTES = 32_000_000  # of many vehicles, about
+_EVERYTHING = (*OF_THE_LAW, *OF_THE_VEHICLE)
 BLOCK_SECONDS = 0.25  # of wall time: a kill may cost three blocks, and should not cost a second
 
 
@@ -65,8 +74,21 @@ def fly(
             raise trouble
         if stop():
             return
-        saturated = columns.saturated[-1].astype(bool)
-        period += len(columns.physics)
+        saturated = columns.saturated[-1]
+        period += len(columns)
+
+
+def what_is_compiled(assembly: Assembly) -> str:
+    """Return in one line what of a flight is compiled, and why the rest is not: by beginning one.
+
+    Raises:
+        FlightError: it cannot be flown.
+    """
+    flight = _Flight(assembly, first_start(assembly, [0]), [0], threads=1)
+    _, _, trouble = flight.record(0, last_period(assembly.scenario), lambda: False)
+    if trouble is not None:
+        raise trouble
+    return str(flight.compiled)
 
 
 class _Flight:
@@ -79,7 +101,7 @@ class _Flight:
         self._law = FlownLaw(assembly.law, start.law, len(members))
         inner = self._law.inner if assembly.inner else None
         self.stepper = Stepper(assembly, start, members, threads=threads, inner=inner)
-        self._compiled = CompiledBlocks(assembly, start, self.stepper, self._law, threads)
+        self.compiled = CompiledBlocks(assembly, start, self.stepper, self._law, threads)
         # Each period, with law, signals and measurement.
         recorded = 4 * self.stepper.batch.state.nbytes
         self._periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
@@ -92,15 +114,17 @@ class _Flight:
         Where the period can be compiled, its first is flown in Python, and proves the rest.
         """
         count = min(self._periods, last - first + 1)
-        if self._compiled.on:
-            count = min(count, self._compiled.periods_in(BLOCK_SECONDS))
         times = np.arange(first, first + count, dtype=float) * self._control
         desired = reference_at(self._assembly.reference, times)
-        in_python = 1 if self._compiled.on else count
-        periods, trouble = self._fly_in_python(first, in_python, last, desired, stop)
-        columns = columns_of(periods) if periods else None
-        if self._compiled.on and columns is not None and trouble is None and count > 1:
-            columns = self._compiled.fly(periods[0], columns, count, last, desired)
+        if not self.compiled.on:
+            columns, _, trouble = self._fly_in_python(first, count, last, desired, stop)
+            return columns, desired, trouble
+        began = clock.monotonic()
+        columns, period, trouble = self._fly_in_python(first, 1, last, desired, stop)
+        seconds = self.compiled.seconds or clock.monotonic() - began  # of a period
+        count = min(count, max(2, int(min(count, BLOCK_SECONDS / seconds))))
+        if count > 1 and columns is not None and trouble is None:
+            columns = self.compiled.fly(period, columns, count, last, desired, stop)
         return columns, desired, trouble
 
     def _fly_in_python(
@@ -110,44 +134,41 @@ class _Flight:
         last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> tuple[list[ControlPeriod], FlightError | None]:
-        periods: list[ControlPeriod] = []
+    ) -> tuple[Columns | None, Any, FlightError | None]:
+        """Return what ``count`` periods recorded, the last of them, and what ended them."""
+        recording: Recording | None = None
         due = clock.monotonic() + BLOCK_SECONDS
-        now = first * self._control
+        now, period, trouble = first * self._control, None, None
         try:
             # A law's infinities are found in what it commands, not in NumPy's warnings.
             with np.errstate(all="ignore"):
                 rows: Any = zip(*(array[:count] for array in desired), strict=True)
                 for number, row in enumerate(rows, first):
-                    now, reference = number * self._control, type(desired)(*row)
-                    self._fly_period(periods, number, reference, flown=number < last)
+                    now = number * self._control
+                    period = self._begin_period(number, type(desired)(*row), number < last)
+                    recording = recording or Recording(period, count, _EVERYTHING)
+                    try:
+                        if number < last:
+                            self.stepper.finish(period)
+                    finally:
+                        recording.write(period)
                     if stop() or clock.monotonic() > due:
                         break
         except (SimulationError, FlightError) as error:
             trouble = FlightError(f"stopped at t = {now:.6g} s: {error}")
             trouble.__cause__ = error.__cause__ or error
-            return periods, trouble
         raised = np.flatnonzero(self.stepper.batch.warning[:, :, 1].any(axis=0))
-        if len(raised):
+        if trouble is None and len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name
-            return periods, FlightError(
+            trouble = FlightError(
                 f"MuJoCo warned ({warning}) between t = {first * self._control:.6g} s and now"
             )
-        return periods, None
+        return None if recording is None else recording.columns(), period, trouble
 
-    def _fly_period(
-        self,
-        periods: list[ControlPeriod],
-        number: int,
-        reference: DesiredMotion,
-        *,
-        flown: bool,
-    ) -> None:
+    def _begin_period(self, number: int, reference: DesiredMotion, flown: bool) -> ControlPeriod:
         period = self.stepper.sense(number)
         period.law, period.command, period.signals = self._law.step(
             period.time, period.measurement, reference
         )
         self.stepper.begin(period, flown=flown)
-        periods.append(period)
-        if flown:
-            self.stepper.finish(period)
+        return period

@@ -6,6 +6,7 @@ simulation, on the batch's threads, with MuJoCo's errors caught; Python has no m
 
 import ctypes
 import functools
+import sys
 import weakref
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,7 +30,8 @@ class _Config(ctypes.Structure):
 @functools.cache
 def library() -> ctypes.CDLL:
     """Return the library that the mujoco package has loaded."""
-    (path,) = Path(mujoco.__file__).parent.glob(_library_name())
+    name = {"win32": "mujoco.dll", "darwin": "libmujoco*.dylib"}.get(sys.platform, "libmujoco.so*")
+    (path,) = Path(mujoco.__file__).parent.glob(name)
     loaded = ctypes.CDLL(str(path))
     pointer, text, count = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int
     for name, result, arguments in (
@@ -46,12 +48,6 @@ def library() -> ctypes.CDLL:
         function = getattr(loaded, name)
         function.restype, function.argtypes = result, arguments
     return loaded
-
-
-def _library_name() -> str:
-    return {"Windows": "mujoco.dll", "Darwin": "libmujoco*.dylib"}.get(
-        __import__("platform").system(), "libmujoco.so*"
-    )
 
 
 def address(function: str) -> int:

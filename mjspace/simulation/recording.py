@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from operator import attrgetter
 from typing import Any
 
 import mujoco
@@ -66,48 +65,100 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
     return replace(block, time=block.time[:first], rows=rows, events=events), problem
 
 
+OF_THE_LAW = ("sensors", "measurement", "law", "signals")
+"""What sensors and law leave in a ``ControlPeriod``."""
+OF_THE_VEHICLE = ("physics", "memory", "command", "applied", "saturated", "wrench", "sensordata")
+_AS_FLOATS = ("law", "command", "signals")
+
+
 @dataclass(frozen=True)
 class Columns:
-    """What consecutive control periods hold, by the names of ``ControlPeriod``; (n, N, ...)."""
+    """What consecutive control periods hold, by the names of ``ControlPeriod``.
 
-    physics: Array
-    sensordata: Array
-    memory: dict[str, Array]
-    sensors: dict[str, Array]
-    measurement: dict[str, Array]
-    law: dict[str, Array]
-    command: dict[str, Array]
-    signals: dict[str, Array]
-    applied: tuple[Array, ...]
-    saturated: Array
-    wrench: Array | None
+    ``groups["memory"]["current"]`` is (n, N, ...); an array that is no part of another has the name
+    "", and the arrays of a tuple without names "0", "1", ....
+    """
+
+    groups: dict[str, dict[str, Array]]
     events: list[Event]
     kinds: dict[str, type]
     """The named tuples of "law", "command" and "signals"."""
 
+    def __len__(self) -> int:
+        """Return the number of periods."""
+        return len(self.physics)
 
-def columns_of(periods: Sequence[ControlPeriod]) -> Columns:
-    """Return the ``periods``, of which there is at least one, with a period axis."""
-    first = periods[0]
+    def __getitem__(self, group: str) -> dict[str, Array]:
+        """Return the arrays of a group, none where there is no such."""
+        return self.groups.get(group, {})
 
-    def column(name: str) -> list[Any]:
-        return list(map(attrgetter(name), periods))
+    @property
+    def physics(self) -> Array:
+        """MuJoCo's integration state, (n, N, nstate)."""
+        return self.groups["physics"][""]
 
-    return Columns(
-        physics=np.array(column("physics")),
-        sensordata=np.array(column("sensordata")),
-        memory=_stacked(column("memory")),
-        sensors=_stacked(column("sensors")),
-        measurement=_measured(column("measurement")),
-        law=_fields(column("law")),
-        command=_fields(column("command")),
-        signals=_fields(column("signals")),
-        applied=tuple(map(np.array, zip(*column("applied"), strict=True))),
-        saturated=np.array(column("saturated")),
-        wrench=None if first.wrench is None else np.array(column("wrench")),
-        events=[event for period in periods for event in period.events],
-        kinds={name: type(getattr(first, name)) for name in ("law", "command", "signals")},
-    )
+    @property
+    def saturated(self) -> Array:
+        """True for each motor that saturates, (n, N, motors)."""
+        return self.groups["saturated"][""].astype(bool)
+
+
+class Recording:
+    """Control periods, written into columns one by one: nothing is kept of each but its numbers."""
+
+    def __init__(self, first: ControlPeriod, count: int, names: Sequence[str]) -> None:
+        """Make room for ``count`` periods like the ``first``, and for these ``names`` of each."""
+        self._rows = 0
+        self._events: list[Event] = []
+        self._kinds = {name: type(getattr(first, name)) for name in _AS_FLOATS}
+        self._columns: dict[str, dict[str, Array]] = {}
+        self._places: list[tuple[str, list[tuple[Any, Array]]]] = []
+        for name in names:
+            columns = self._columns[name] = {}
+            places = []
+            for key, label, value in _fields(first, name):
+                array = np.asarray(value)
+                kind = float if name in _AS_FLOATS else array.dtype
+                columns[label] = column = np.empty((count, *array.shape), kind)
+                places.append((key, column))
+            self._places.append((name, places))
+
+    def write(self, period: ControlPeriod) -> None:
+        """Record a period that is over, or as far as it came."""
+        row = self._rows
+        for name, places in self._places:
+            source = getattr(period, name)
+            if name == "measurement":
+                source = vars(source)
+            for key, column in places:
+                column[row] = source[key]
+        self._events += period.events
+        self._rows += 1
+
+    def columns(self) -> Columns:
+        """Return what has been recorded, as views."""
+        groups = {
+            name: {label: column[: self._rows] for label, column in columns.items()}
+            for name, columns in self._columns.items()
+        }
+        return Columns(groups, self._events, self._kinds)
+
+
+def _fields(period: ControlPeriod, name: str) -> list[tuple[Any, str, Any]]:
+    """Return (key of the value, name of the column, value) of each array of a group.
+
+    What a vehicle lacks, a kind of sensor or motor, is an empty array, and left out.
+    """
+    group = getattr(period, name)
+    if isinstance(group, np.ndarray):
+        return [(..., "", group)]
+    if isinstance(group, dict):
+        return [(key, key, value) for key, value in group.items()]
+    if isinstance(group, Measurement):
+        return [(key, key, value) for key, value in vars(group).items() if np.size(value)]
+    names = getattr(group, "_fields", map(str, range(len(group or ()))))
+    arrays = zip(range(len(group or ())), names, group or (), strict=True)
+    return [each for each in arrays if name == "applied" or np.size(each[2])]
 
 
 def block_of(
@@ -123,7 +174,7 @@ def block_of(
 
     ``reference`` has arrays of at least as many rows, without a vehicle axis.
     """
-    physics, data, memory = columns.physics, columns.sensordata, columns.memory
+    physics, data, memory = columns.physics, columns["sensordata"][""], columns["memory"]
     n, vehicle = len(physics), assembly.vehicle
     desired = {name: a[:n, None] for name, a in reference._asdict().items()}
     truth = truth_of(physics, memory, layout, assembly.actuators, effects)
@@ -132,11 +183,11 @@ def block_of(
         of_effects |= effect.logged(memory, data)
     state = {"physics": physics}
     state |= {f"actuator_{name}": a for name, a in memory.items()}
-    state |= {f"law_{name}": a for name, a in columns.law.items()}
-    state |= {f"sensor_{name}": a for name, a in columns.sensors.items()}
+    state |= {f"law_{name}": a for name, a in columns["law"].items()}
+    state |= {f"sensor_{name}": a for name, a in columns["sensors"].items()}
     environment = data[..., vehicle.environment]
-    if columns.wrench is not None:
-        environment = environment + columns.wrench
+    for wrench in columns["wrench"].values():
+        environment = environment + wrench
     rows: Rows = {
         "/state": state,
         "/truth": {
@@ -151,18 +202,20 @@ def block_of(
                 ..., None
             ],
         },
-        "/measurement": columns.measurement,
+        "/measurement": columns["measurement"],
         "/reference": {
             name: np.broadcast_to(a, (n, physics.shape[1], a.shape[-1]))
             for name, a in desired.items()
         },
-        "/command": {**columns.command, **assembly.actuators.logged(columns.applied)},
-        "/law": columns.signals,
+        "/command": {
+            **columns["command"],
+            **assembly.actuators.logged(columns["applied"].values()),
+        },
+        "/law": columns["signals"],
         "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
     }
     time = (number + np.arange(n, dtype=float)) * assembly.scenario.rates.control
-    saturated = columns.saturated.astype(bool)
-    events = _saturation_events(time, saturated, saturated_before, vehicle.motors)
+    events = _saturation_events(time, columns.saturated, saturated_before, vehicle.motors)
     kinds = {
         "/state": columns.kinds["law"],
         "/reference": type(reference),
@@ -185,25 +238,6 @@ def _position_errors(
     lean = np.sqrt(quaternion[..., 1] ** 2 + quaternion[..., 2] ** 2)
     tilt = 2.0 * np.arcsin(np.minimum(lean, 1.0))
     return {"position_error": position - reference["position"], "tilt": tilt[..., None]}
-
-
-def _stacked(states: list[dict[str, Array]]) -> dict[str, Array]:
-    """Return named arrays of several periods with a period axis."""
-    return {name: np.array([state[name] for state in states]) for name in states[0]}
-
-
-def _measured(measurements: list[Measurement]) -> dict[str, Array]:
-    """Return what each sensor reported as arrays with a period axis; without what is empty."""
-    names = measurements[0]._fields
-    return _without_empty({n: np.array([vars(m)[n] for m in measurements]) for n in names})
-
-
-def _fields(tuples: list[Any]) -> dict[str, Array]:
-    """Return the named tuples' fields as arrays with a period axis; without what is empty."""
-    if not tuples[0]:
-        return {}
-    names, columns = tuples[0]._fields, zip(*tuples, strict=True)
-    return _without_empty({n: np.array(c, float) for n, c in zip(names, columns, strict=True)})
 
 
 def _without_empty(fields: dict[str, Array]) -> dict[str, Array]:

@@ -54,7 +54,7 @@ class Stepper:
         bus = assembly.vehicle.model.body("bus").id
         self._on_bus = self.batch.bind("xfrc_applied")[:, bus]  # force and torque, inertial axes
         self.layout = StateLayout(assembly)
-        self._suite, self._sensors = assembly.sensors(members), start.sensors
+        self._suite, self.sensors = assembly.sensors(members), start.sensors
         self.memory = start.actuators
         self._actuators, self._inner, self._hold = assembly.actuators, inner, assembly.hold
         self._inputs = self._actuators.inputs(self.batch)
@@ -87,7 +87,7 @@ class Stepper:
         period = ControlPeriod()
         period.number, period.time = number, number * self._control
         period.physics = physics = self._copy_of_state()
-        period.events, period.sensors = [], self._sensors
+        period.events, period.sensors = [], self.sensors
         if self.effects:
             self._each_effect("observe", physics, period.time, period.events)
         period.memory, period.truth = self.memory, self._truth(physics)
@@ -179,7 +179,7 @@ class Stepper:
         return sealed(truth_of(physics, self.memory, self.layout, self._actuators, self.effects))
 
     def _measure(self, step: int, truth: Measurement) -> Measurement:
-        self._sensors, measurement = self._suite.sample(self._sensors, step, truth)
+        self.sensors, measurement = self._suite.sample(self.sensors, step, truth)
         return measurement if measurement is truth else sealed(measurement)
 
     def _drive(

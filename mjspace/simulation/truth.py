@@ -19,7 +19,7 @@ def truth_of(
 
     ``memory`` is what actuators and effects remember then, (..., N, k).
     """
-    truth = actuators.seen(memory, layout.truth(physics))
+    truth = actuators.measured(memory, layout.truth(physics))
     for effect in effects:
         truth = effect.add_to_truth(memory, truth)
     return truth

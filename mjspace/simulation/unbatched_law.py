@@ -6,19 +6,23 @@ from typing import Any
 import numpy as np
 
 from mjspace.contract import DesiredMotion, Law, Measurement
-from mjspace.errors import FlightError
-from mjspace.simulation.user_code import check_state, check_step
+from mjspace.simulation.user_code import ReturnError, check_state, check_step
 
 
 class UnbatchedLaw:
-    """A law of arrays without a vehicle axis, flown on arrays with one."""
+    """A law of arrays without a vehicle axis, flown on arrays with one.
+
+    Attributes:
+        law: that law.
+    """
 
     def __init__(self, law: Law) -> None:
-        self._law = law
+        self.law = law
 
     def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
         """Return the law's state with a vehicle axis."""
-        states = [self._law.reset(one, reference) for one in _measured(measurement)]
+        vehicles = range(len(measurement.rate))
+        states = [self.law.reset(_of_vehicle(measurement, v), reference) for v in vehicles]
         for state in states:
             check_state(state)
         return _stack("state", states)
@@ -27,13 +31,9 @@ class UnbatchedLaw:
         self, state: Any, time: float, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
         """Return the law's state, command and signals with a vehicle axis."""
-        states = _vehicles(state) if state else [state] * len(measurement.rate)
         flown = [
-            self._law.step(s, time, m, reference)
-            for s, m in zip(states, _measured(measurement), strict=True)
+            self._step(v, state, time, measurement, reference) for v in range(len(measurement.rate))
         ]
-        for returned in flown:
-            check_step(returned)
         after, commands, signals = zip(*flown, strict=True)
         return _stack("state", after), _stack("command", commands), _stack("signals", signals)
 
@@ -41,11 +41,22 @@ class UnbatchedLaw:
         self, state: Any, time: Any, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
         """Return what ``step`` does, for arrays of one vehicle that may be traced."""
-        one = _vehicles(state)[0] if state else state
-        returned = self._law.step(one, time, measurement._map(lambda a: a[0]), reference)
-        check_step(returned)
+        returned = self._step(0, state, time, measurement, reference)
         after, command, signals = (_with_axis(part) if part else () for part in returned)
         return after, command, signals
+
+    def _step(
+        self, vehicle: int, state: Any, time: Any, measurement: Measurement, reference: Any
+    ) -> tuple[Any, Any, Any]:
+        """Return what the law returns for that vehicle."""
+        own = type(state)(*(field[vehicle] for field in state)) if state else state
+        returned = self.law.step(own, time, _of_vehicle(measurement, vehicle), reference)
+        check_step(returned)
+        return returned
+
+
+def _of_vehicle(measurement: Measurement, vehicle: int) -> Measurement:
+    return measurement._map(lambda array: array[vehicle])
 
 
 def _with_axis(arrays: Any) -> Any:
@@ -54,27 +65,16 @@ def _with_axis(arrays: Any) -> Any:
     return type(arrays)(*(each.astype(float)[None] for each in floats))
 
 
-def _measured(measurement: Measurement) -> list[Measurement]:
-    """Return the measurement of each vehicle, without the vehicle axis."""
-    kind, names = type(measurement), measurement._fields
-    rows = zip(*measurement._asdict().values(), strict=True)
-    return [kind(**dict(zip(names, row, strict=True))) for row in rows]
-
-
-def _vehicles(arrays: Any) -> list[Any]:
-    return [type(arrays)(*row) for row in zip(*arrays, strict=True)]
-
-
 def _stack(name: str, tuples: Sequence[Any]) -> Any:
     """Return the named tuples as one, a vehicle axis before each field; None is an empty tuple.
 
     Raises:
-        FlightError: a field is not numeric, or fields or shapes differ between vehicles.
+        ReturnError: a field is not numeric, or fields or shapes differ between vehicles.
     """
     names = [getattr(one, "_fields", ()) for one in tuples]
     for other in names[1:]:
         if other != names[0]:
-            raise FlightError(
+            raise ReturnError(
                 f"the law's {name} has the fields {list(names[0])} for one vehicle and "
                 f"{list(other)} for another: it must return the same for all"
             )
@@ -85,7 +85,7 @@ def _stack(name: str, tuples: Sequence[Any]) -> Any:
         try:
             fields.append(np.array(column, dtype=float))
         except (TypeError, ValueError) as error:
-            raise FlightError(
+            raise ReturnError(
                 f"the law's {name}.{field} is not an array of numbers: {error}"
             ) from error
     return type(tuples[0])(*fields)

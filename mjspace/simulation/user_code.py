@@ -16,6 +16,10 @@ STEP = (
 )
 
 
+class ReturnError(FlightError):
+    """A law returned anything but what it must return."""
+
+
 def read_only(arrays: Tuple) -> Tuple:
     """Return the (named) tuple after making its arrays read-only, and the arrays they are views of.
 
@@ -66,10 +70,10 @@ def check_state(state: Any) -> None:
     """Refuse what cannot be a law's state.
 
     Raises:
-        FlightError: neither a named tuple nor None.
+        ReturnError: neither a named tuple nor None.
     """
     if not _is_optional(state):
-        raise FlightError(
+        raise ReturnError(
             f"the law's reset returned {_described(state)}: it must return its state, a named "
             "tuple of arrays, or None"
         )
@@ -79,19 +83,19 @@ def check_step(returned: Any) -> None:
     """Refuse what a law's ``step`` must not return.
 
     Raises:
-        FlightError: anything but (state, command, signals), with what it is instead.
+        ReturnError: anything but (state, command, signals), with what it is instead.
     """
     if type(returned) is not tuple or len(returned) != 3:
-        raise FlightError(f"the law's step returned {_described(returned)}: {STEP}")
+        raise ReturnError(f"the law's step returned {_described(returned)}: {STEP}")
     state, command, signals = returned
     if not _is_named(command):
-        raise FlightError(
+        raise ReturnError(
             f"the law's step returned {_described(returned)}: the command must be a named tuple of "
             "arrays, such as TorqueCommand(torque)"
         )
     for name, part in (("state", state), ("signals", signals)):
         if not _is_optional(part):
-            raise FlightError(
+            raise ReturnError(
                 f"the law's step returned {_described(returned)}: the {name} must be a named tuple "
                 "of arrays, or None"
             )
@@ -101,11 +105,11 @@ def check_inner(returned: Any) -> None:
     """Refuse what a law's inner loop must not return.
 
     Raises:
-        FlightError: anything but (state, command), with what was returned.
+        ReturnError: anything but (state, command), with what was returned.
     """
     good = type(returned) is tuple and len(returned) == 2
     if not (good and _is_optional(returned[0]) and _is_named(returned[1])):
-        raise FlightError(
+        raise ReturnError(
             f"the law's inner loop returned {_described(returned)}: it must return (state, "
             "command), named tuples of arrays; state may be None"
         )
@@ -115,13 +119,13 @@ def check_vehicle_axis(name: str, arrays: Any, vehicles: int) -> None:
     """Refuse a batched law's tuple in which an array does not begin with the vehicle axis.
 
     Raises:
-        FlightError: the first such field, with its shape.
+        ReturnError: the first such field, with its shape.
     """
     for field, shape in _by_name(arrays).items():
         if not isinstance(getattr(arrays, field), np.ndarray):
-            raise FlightError(f"the law's {name}.{field} must be an array, of a batched law")
+            raise ReturnError(f"the law's {name}.{field} must be an array, of a batched law")
         if not shape or shape[0] != vehicles:
-            raise FlightError(
+            raise ReturnError(
                 f"the law's {name}.{field} has the shape {shape}: of a batched law it must begin "
                 f"with the vehicle axis, ({vehicles}, ...)"
             )
@@ -140,14 +144,14 @@ def check_same_shapes(name: str, arrays: Any, first: Any) -> None:
     """Refuse a law's tuple whose fields or their shapes are not those of its ``first``.
 
     Raises:
-        FlightError: with the fields or the shapes that differ.
+        ReturnError: with the fields or the shapes that differ.
     """
     now, before = _by_name(arrays), _by_name(first)
     if now.keys() != before.keys():
-        raise FlightError(f"the law's {name} has the fields {list(now)} after {list(before)}")
+        raise ReturnError(f"the law's {name} has the fields {list(now)} after {list(before)}")
     for field, shape in now.items():
         if shape != before[field]:
-            raise FlightError(
+            raise ReturnError(
                 f"the law's {name}.{field} has the shape {shape} after {before[field]}: shapes "
                 "must not change"
             )

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 
-class Untraceable(Exception):  # noqa: N818
+class Untraceable(Exception):  # noqa: N818 - says what the code is
     """Array code that cannot be taken down as calls of inner loops, with the reason."""
 
 

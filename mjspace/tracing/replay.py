@@ -13,9 +13,11 @@ from mjspace.tracing.program import Calls
 
 _BYTE, _WORD = ir.IntType(8), ir.IntType(64)
 _POINTER = _BYTE.as_pointer()
+_intrinsic: Any = intrinsic
 
 
-def _generate_call(
+@_intrinsic
+def call_loop(
     context: Any, loop: Any, operands: Any, dimensions: Any, steps: Any, data: Any
 ) -> Any:
     """Call ``void loop(char** operands, npy_intp* dimensions, npy_intp* steps, void* data)``."""
@@ -29,7 +31,8 @@ def _generate_call(
     return types.void(*[types.int64] * 5), generate
 
 
-def _generate_copy(context: Any, target: Any, source: Any, size: Any) -> Any:
+@_intrinsic
+def copy_bytes(context: Any, target: Any, source: Any, size: Any) -> Any:
     """Copy ``size`` bytes between addresses that do not overlap."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -41,23 +44,19 @@ def _generate_copy(context: Any, target: Any, source: Any, size: Any) -> Any:
     return types.void(*[types.int64] * 3), generate
 
 
-call_loop: Any = intrinsic(_generate_call)
-copy_bytes: Any = intrinsic(_generate_copy)
-
-
 @njit
 def address_of(array: Any) -> Any:
     """Return where the ``array`` begins; signed, since NumPy adds a mixed sum up as floats."""
     return np.int64(array.ctypes.data)
 
 
-@njit(cache=True, nogil=True)
+@njit("int64[::1](int64[::1], int64[::1], int64)", cache=True)
 def placed(words: Any, relative: Any, base: int) -> Any:
     """Return the ``words`` of a program whose memory begins at the address ``base``."""
     return words + relative * base
 
 
-@njit(cache=True, nogil=True)
+@njit("void(int64[:, ::1], int64[::1])", cache=True)
 def run(table: Any, words: Any) -> None:
     """Call the loops of the ``table``, whose ``words`` have been placed."""
     base = address_of(words)

@@ -49,27 +49,27 @@ class TracedArray(NDArrayOperatorsMixin):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Return the length of each axis."""
+        """Length along each axis, as of any array."""
         return self.array.shape
 
     @property
     def ndim(self) -> int:
-        """Return the number of axes."""
+        """Number of axes."""
         return self.array.ndim
 
     @property
     def size(self) -> int:
-        """Return the number of elements."""
+        """Number of elements."""
         return self.array.size
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Return the kind of its elements: float64 or bool."""
+        """float64 or bool."""
         return self.array.dtype
 
     @property
-    def T(self) -> "TracedArray":  # noqa: N802
-        """Return it with its axes reversed."""
+    def T(self) -> "TracedArray":  # noqa: N802 - an array's name for it
+        """Return the transposed, as an array does."""
         return self._traced(self.array.T)  # type: ignore[no-any-return]
 
     def __len__(self) -> int:
@@ -88,7 +88,7 @@ class TracedArray(NDArrayOperatorsMixin):
 
     def __pow__(self, exponent: Any) -> Any:
         if self._is_number and _is_number(exponent):
-            return ufuncs.power_of_numbers(self, exponent)
+            return ufuncs.power_of_numbers.ufunc(self, exponent)
         if isinstance(exponent, TracedArray):
             return np.power(self, exponent)
         # An array's own shortcuts, such as np.square, differ from np.power in the last digit.
@@ -97,7 +97,7 @@ class TracedArray(NDArrayOperatorsMixin):
 
     def __rpow__(self, base: Any) -> Any:
         of_numbers = self._is_number and _is_number(base)
-        return ufuncs.power_of_numbers(base, self) if of_numbers else np.power(base, self)
+        return ufuncs.power_of_numbers.ufunc(base, self) if of_numbers else np.power(base, self)
 
     def __ipow__(self, exponent: Any) -> Any:
         powers = self**exponent

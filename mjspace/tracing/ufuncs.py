@@ -4,9 +4,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numba import guvectorize, vectorize
 from numpy.typing import NDArray
 
+from mjspace.gufunc import gufunc
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.tracing.program import Program
 
@@ -16,16 +16,16 @@ _BOOL, _FLOAT = np.dtype(bool), np.dtype(float)
 _MATMUL = "(n,k),(k,m)->(n,m)"
 
 
-@guvectorize(["void(b1[:], f8[:], f8[:], f8[:])"], "(n),(n),(n)->(n)", cache=True)
+@gufunc(["void(b1[:], f8[:], f8[:], f8[:])"], "(n),(n),(n)->(n)")
 def _select(condition: Any, yes: Any, no: Any, result: Any) -> None:
     for i in range(condition.size):
         result[i] = yes[i] if condition[i] else no[i]
 
 
-@vectorize(["f8(f8, f8)"], cache=True)
-def power_of_numbers(base: Any, exponent: Any) -> Any:
-    """Return ``base ** exponent`` as Python and NumPy's scalars compute it: by C's ``pow``."""
-    return base**exponent
+@gufunc(["void(f8, f8, f8[:])"], "(),()->()")
+def power_of_numbers(base: Any, exponent: Any, result: Any) -> None:
+    """Compute ``base ** exponent`` as Python and NumPy's scalars do: by C's ``pow``."""
+    result[0] = base**exponent
 
 
 def apply(

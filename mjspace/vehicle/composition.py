@@ -9,10 +9,8 @@ import numpy as np
 
 from mjspace.errors import input_error_at, nearest
 from mjspace.scenario.hinges import Hinge
-from mjspace.scenario.landing import Ground
 from mjspace.scenario.plant import Part, PlantTable
-from mjspace.vehicle import ground_contact, mass_properties
-from mjspace.vehicle.deployments import Deployment
+from mjspace.vehicle import deployments, mass_properties
 
 ASSETS = Path(str(files("mjspace.assets")))
 """The folder of the models and their parts."""
@@ -37,7 +35,7 @@ def compose(table: PlantTable) -> Any:
         _bear(_hinge(spec, name, of_equipment), hinge)
     _attach_equipment(spec, table, before_parts=False)
     if table.ground is not None:
-        _attach_ground(spec, table.ground)
+        table.ground.attach(spec)
     stops = any(hinge.stops for hinge in table.hinges.values())
     if stops:
         # The torques on a gimbal and on what carries it differ by the solver's remainder: at its
@@ -71,25 +69,8 @@ def _attach_part(spec: Any, name: str, part: Part) -> None:
     child = mujoco.MjSpec.from_file(str(ASSETS / f"parts/{part.part}/{part.part}.xml"))
     mount = spec.body("bus").add_frame(pos=part.position)
     mujoco.mju_euler2Quat(mount.quat, np.array(part.euler), "XYZ")  # about fixed axes
-    if part.deployment is not None:
-        stow = {"boom": _drive_out, "yo_yo": _hold}[part.part]
-        stow(child, part.deployment)
+    deployments.prepare(child, part)
     spec.attach(child, prefix=f"{name}_", frame=mount)
-
-
-def _drive_out(boom: Any, deployment: Deployment) -> None:
-    """Make the boom's motor a position loop, which MuJoCo closes in every stage."""
-    drive, tip, w = boom.actuator("drive"), boom.body("tip"), deployment.bandwidth
-    drive.gainprm[0] = tip.mass * w**2
-    drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-    drive.biasprm[:3] = [0.0, -tip.mass * w**2, -2.0 * tip.mass * w]
-
-
-def _hold(yo_yo: Any, deployment: Deployment) -> None:
-    """Hold the weight where little of its cord is off the drum."""
-    held = yo_yo.equality("held")
-    held.active = True
-    held.data[0] = deployment.unwound - yo_yo.joint("unwind").ref
 
 
 def _attach_equipment(spec: Any, table: PlantTable, *, before_parts: bool) -> None:
@@ -129,16 +110,3 @@ def _bear(joint: Any, hinge: Hinge) -> None:
         joint.limited = True
         joint.range = hinge.stops
         joint.solref_limit, joint.solimp_limit = _STOP_SPRING, _STOP_HARDNESS
-
-
-def _attach_ground(spec: Any, ground: Ground) -> None:
-    """Lay the ground through the origin, sloping down towards ``downhill``."""
-    file = ASSETS / f"parts/{ground.part}/{ground.part}.xml"
-    if not file.is_file():
-        known = ", ".join(sorted(path.parent.name for path in ASSETS.glob("parts/moon_*/*.xml")))
-        raise ValueError(f"plant.ground.part: no part {ground.part!r}: have {known}")
-    across = [-np.sin(ground.downhill), np.cos(ground.downhill), 0.0]
-    frame = spec.worldbody.add_frame()
-    mujoco.mju_axisAngle2Quat(frame.quat, np.array(across), ground.slope)
-    spec.attach(mujoco.MjSpec.from_file(str(file)), prefix="site_", frame=frame)
-    ground_contact.add_sensors(spec, "site_ground")

@@ -1,8 +1,10 @@
 """Parts that are deployed in flight: booms driven out on their slides, yo-yos that despin."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
+import mujoco
 import numpy as np
 
 from mjspace.contract import TICK, Array, Event
@@ -31,10 +33,66 @@ class Deployment(Table):
     """Of a yo-yo: cord off the drum while it is held. With none, turning and sliding would be one
     motion."""
 
+    def check(self, part: str) -> None:
+        """Refuse a deployment that does not fit that part.
+
+        Raises:
+            ValueError: the part is not deployed, or needs other keys.
+        """
+        if part not in KINDS:
+            raise ValueError(f"deployment: a {part} has none, a {' or a '.join(KINDS)} has")
+        for kind, deployed in KINDS.items():
+            given = [getattr(self, key) is not None for key in deployed.needs]
+            if any(given) if kind != part else not all(given):
+                keys = " and ".join(deployed.needs)
+                raise ValueError(f"deployment: {keys} are a {kind}'s, and it needs them")
+
+
+class Deployable(NamedTuple):
+    """What of a batch of vehicles a deployment acts on."""
+
+    batch: Any
+    """The ``mujoco.batch.Batch``."""
+    ctrl: Array
+    active: Array
+    """``eq_active``."""
+    qpos: Array
+    qvel: Array
+
+
+class Deployed(ABC):
+    """Base of a kind of part that is deployed; what it remembers is in MuJoCo's state alone."""
+
+    needs: ClassVar[tuple[str, ...]] = ()
+    """Keys of the table that it needs, and no other kind takes."""
+
+    @staticmethod
+    @abstractmethod
+    def prepare(part: Any, table: Deployment) -> None:
+        """Change the part's ``MjSpec``, before it is attached, so that it is held until then."""
+
+    @staticmethod  # noqa: B027
+    def stow(model: Any, qpos: Array, name: str, table: Deployment) -> None:
+        """Set the joints of the part of that name in ``qpos`` (nq,) to where it is held."""
+
+    @classmethod
+    @abstractmethod
+    def of(cls, model: Any, qpos: Array, name: str, table: Deployment) -> Self:
+        """Return the part of that name on a vehicle that begins at ``qpos`` (nq,)."""
+
+    def bind(self, on: Deployable) -> None:  # noqa: B027
+        """Bring the model of a batch up to what has been deployed already."""
+
+    @abstractmethod
+    def act(self, on: Deployable, now: float, step: float) -> list[Event]:
+        """Act on the integration step of ``step`` [s] that begins at ``now`` [s]; report events."""
+
 
 @dataclass(frozen=True)
-class Boom:
+class Boom(Deployed):
     """A boom's drive: its position loop is commanded the tip's desired distance."""
+
+    needs: ClassVar[tuple[str, ...]] = ("length", "rate")
 
     name: str
     table: Deployment
@@ -44,6 +102,14 @@ class Boom:
     """In ``ctrl``."""
     lead: float
     """Time by which the loop's command leads the desired distance, against its lag [s]."""
+
+    @staticmethod
+    def prepare(part: Any, table: Deployment) -> None:
+        """Make the boom's motor a position loop, which MuJoCo closes in every stage."""
+        drive, tip, w = part.actuator("drive"), part.body("tip"), table.bandwidth
+        drive.gainprm[0] = tip.mass * w**2
+        drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        drive.biasprm[:3] = [0.0, -tip.mass * w**2, -2.0 * tip.mass * w]
 
     @classmethod
     def of(cls, model: Any, qpos: Array, name: str, table: Deployment) -> Self:
@@ -69,6 +135,16 @@ class Boom:
         begun, ended = self._ramp(since), self._ramp(since - cruise)
         return self.stowed + rate * (begun[0] - ended[0]), rate * (begun[1] - ended[1])
 
+    def act(self, on: Deployable, now: float, step: float) -> list[Event]:
+        """Command the drive for the middle of the step."""
+        place, rate = self.desired(now + 0.5 * step)
+        on.ctrl[:, self.motor] = place + self.lead * rate
+        events: list[Event] = []
+        for moment, what in ((self.table.at, "sets out"), (self.end, "is out")):
+            if now - TICK <= moment < now + step - TICK:
+                events += _events(now, np.arange(len(on.ctrl)), f"{self.name} {what}")
+        return events
+
     def _ramp(self, since: float) -> tuple[float, float]:
         """Return the integral of what grows from 0 to 1 during the ramp, and that itself."""
         ramp = self.table.ramp
@@ -78,8 +154,12 @@ class Boom:
 
 
 @dataclass(frozen=True)
-class YoYo:
-    """A weight on its cord: held, then unwinding, then gone."""
+class YoYo(Deployed):
+    """A weight on its cord: held, then unwinding, then gone.
+
+    It is let go in the step that begins nearest to where its cord is off the drum; its mass is then
+    removed from the model, so that the bus no longer carries it.
+    """
 
     name: str
     at: float
@@ -97,8 +177,22 @@ class YoYo:
     all_off: float
     """The angle at which no cord is left on the drum [rad]."""
 
+    @staticmethod
+    def prepare(part: Any, table: Deployment) -> None:
+        """Hold the weight where little of its cord is off the drum."""
+        held = part.equality("held")
+        held.active = True
+        held.data[0] = table.unwound - part.joint("unwind").ref
+
+    @staticmethod
+    def stow(model: Any, qpos: Array, name: str, table: Deployment) -> None:
+        """Set the joints to where the weight is held."""
+        unwind, pay_out = (model.joint(f"{name}_{what}") for what in ("unwind", "pay_out"))
+        cord = pay_out.qpos0[0] / unwind.qpos0[0] * table.unwound
+        qpos[[unwind.qposadr[0], pay_out.qposadr[0]]] = table.unwound, cord
+
     @classmethod
-    def of(cls, model: Any, name: str, table: Deployment) -> Self:
+    def of(cls, model: Any, qpos: Array, name: str, table: Deployment) -> Self:
         """Return the yo-yo of that name."""
         held, wound = (model.equality(f"{name}_{what}").id for what in ("held", "wound"))
         joint = model.joint(f"{name}_unwind")
@@ -106,65 +200,57 @@ class YoYo:
         weight = model.body(f"{name}_weight").id
         return cls(name, table.at, held, wound, weight, place, speed, float(joint.qpos0[0]))
 
+    def bind(self, on: Deployable) -> None:
+        """Remove weights that are gone already."""
+        self._remove(on, on.active[:, [self.held, self.wound]].max(axis=1) == 0.0)
+
+    def act(self, on: Deployable, now: float, step: float) -> list[Event]:
+        """Release the weight, or let it go."""
+        held, wound = on.active[:, self.held], on.active[:, self.wound]
+        released = (held > 0.0) & (now >= self.at - TICK)
+        held[released] = 0.0
+        # The angle half a step from now.
+        angle = on.qpos[:, self.place] + 0.5 * step * on.qvel[:, self.speed]
+        off = (held == 0.0) & (wound > 0.0) & (angle >= self.all_off)
+        wound[off] = 0.0
+        self._remove(on, off)
+        return _events(now, np.flatnonzero(released), f"{self.name} is released") + _events(
+            now, np.flatnonzero(off), f"{self.name} is let go"
+        )
+
+    def _remove(self, on: Deployable, gone: Any) -> None:
+        if gone.any():
+            on.batch.expand("body_mass")[gone, self.weight] = GONE
+            on.batch.set_const()
+
+
+KINDS: dict[str, type[Deployed]] = {"boom": Boom, "yo_yo": YoYo}
+"""The parts that are deployed, by their folder in assets/parts/. A line registers each."""
+
 
 class Deployments(StepEffect):
-    """What is deployed on a batch of vehicles; memory is in MuJoCo's state alone.
-
-    A weight is let go in the step that begins nearest to where its cord is off the drum; its mass
-    is then removed from the model, so that the bus no longer carries it.
-    """
+    """What is deployed on a batch of vehicles; memory is in MuJoCo's state alone."""
 
     name: ClassVar[str] = "the deployment"
     every_step: ClassVar[bool] = True
 
-    def __init__(self, booms: list[Boom], yo_yos: list[YoYo], step: float) -> None:
-        """Keep what is deployed; ``step`` [s] is the integration's."""
-        self._booms, self._yo_yos, self._step = booms, yo_yos, step
-        self._batch: Any = None
-        self._ctrl: Any = None
-        self._active: Any = None
-        self._qpos: Any = None
-        self._qvel: Any = None
+    def __init__(self, deployed: list[Deployed], step: float) -> None:
+        """Keep what is ``deployed``; ``step`` [s] is the integration's."""
+        self._deployed, self._step = deployed, step
+        self._on: Any = None
 
     def bind(self, batch: Any) -> None:
-        """Take motors, equalities and joints; remove weights that are gone already."""
-        self._batch = batch
-        self._ctrl, self._active = batch.bind("ctrl"), batch.bind("eq_active")
-        self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        for yo_yo in self._yo_yos:
-            self._remove(yo_yo, self._active[:, [yo_yo.held, yo_yo.wound]].max(axis=1) == 0.0)
+        """Take motors, equalities and joints."""
+        arrays = (batch.bind(name) for name in ("ctrl", "eq_active", "qpos", "qvel"))
+        self._on = Deployable(batch, *arrays)
+        for each in self._deployed:
+            each.bind(self._on)
 
     def before_step(self, memory: State, instant: Instant) -> State:
-        """Drive the booms, release and let go of weights, and report it."""
-        now, events = instant.time, instant.events
-        for boom in self._booms:
-            place, rate = boom.desired(now + 0.5 * self._step)
-            self._ctrl[:, boom.motor] = place + boom.lead * rate
-            for moment, what in ((boom.table.at, "sets out"), (boom.end, "is out")):
-                if now - TICK <= moment < now + self._step - TICK:
-                    everyone = np.arange(len(self._ctrl))
-                    events += _events(now, everyone, f"{boom.name} {what}")
-        for yo_yo in self._yo_yos:
-            events += self._unwind(yo_yo, now)
+        """Let each act, and report it."""
+        for each in self._deployed:
+            instant.events.extend(each.act(self._on, instant.time, self._step))
         return memory
-
-    def _unwind(self, yo_yo: YoYo, now: float) -> list[Event]:
-        held, wound = self._active[:, yo_yo.held], self._active[:, yo_yo.wound]
-        released = (held > 0.0) & (now >= yo_yo.at - TICK)
-        held[released] = 0.0
-        # The angle half a step from now.
-        angle = self._qpos[:, yo_yo.place] + 0.5 * self._step * self._qvel[:, yo_yo.speed]
-        off = (held == 0.0) & (wound > 0.0) & (angle >= yo_yo.all_off)
-        wound[off] = 0.0
-        self._remove(yo_yo, off)
-        return _events(now, np.flatnonzero(released), f"{yo_yo.name} is released") + _events(
-            now, np.flatnonzero(off), f"{yo_yo.name} is let go"
-        )
-
-    def _remove(self, yo_yo: YoYo, gone: Any) -> None:
-        if gone.any():
-            self._batch.expand("body_mass")[gone, yo_yo.weight] = GONE
-            self._batch.set_const()
 
 
 def of(model: Any, qpos: Array, parts: dict[str, Any], step: float) -> Deployments | None:
@@ -172,30 +258,32 @@ def of(model: Any, qpos: Array, parts: dict[str, Any], step: float) -> Deploymen
 
     ``qpos`` (nq,) is the vehicle's at the start, ``step`` [s] the integration's.
     """
-    deployed = {name: part for name, part in parts.items() if part.deployment is not None}
-    if not deployed:
+    found = _deployed(parts)
+    if not found:
         return None
-    booms = [
-        Boom.of(model, qpos, name, part.deployment)
-        for name, part in deployed.items()
-        if part.part == "boom"
-    ]
-    yo_yos = [
-        YoYo.of(model, name, part.deployment)
-        for name, part in deployed.items()
-        if part.part == "yo_yo"
-    ]
-    return Deployments(booms, yo_yos, step)
+    return Deployments([k.of(model, qpos, name, part.deployment) for k, name, part in found], step)
 
 
 def stow(model: Any, qpos: Array, parts: dict[str, Any]) -> None:
-    """Set in ``qpos`` the joints of the yo-yos among ``parts`` to where the weights are held."""
-    for name, part in parts.items():
-        if part.part == "yo_yo" and part.deployment is not None:
-            angle = part.deployment.unwound
-            unwind, pay_out = (model.joint(f"{name}_{what}") for what in ("unwind", "pay_out"))
-            cord = pay_out.qpos0[0] / unwind.qpos0[0] * angle
-            qpos[[unwind.qposadr[0], pay_out.qposadr[0]]] = angle, cord
+    """Set in ``qpos`` the joints of those among ``parts`` that are held until they are deployed."""
+    for kind, name, part in _deployed(parts):
+        kind.stow(model, qpos, name, part.deployment)
+
+
+def prepare(spec: Any, part: Any) -> None:
+    """Prepare the ``MjSpec`` of a ``part`` for its deployment, if it has one."""
+    if part.deployment is not None:
+        KINDS[part.part].prepare(spec, part.deployment)
+
+
+def _deployed(parts: dict[str, Any]) -> list[tuple[type[Deployed], str, Any]]:
+    """Return kind, name and table of all that is deployed, those of one kind together."""
+    return [
+        (kind, name, part)
+        for folder, kind in KINDS.items()
+        for name, part in parts.items()
+        if part.part == folder and part.deployment is not None
+    ]
 
 
 def _events(now: float, vehicles: Any, what: str) -> list[Event]:

@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.spatial.transform import Rotation
 
 from mjspace.contract import Array
 from mjspace.scenario.hinges import Bearing
 from mjspace.scenario.plant import PlantTable
+
+# SciPy is imported when a vehicle is built: it takes 0.3 s, and a scenario's tables need no more
+# of this file than its named tuples.
 
 
 class Inertial(NamedTuple):
@@ -28,16 +29,18 @@ class Inertial(NamedTuple):
 class Rotors(NamedTuple):
     """Balanced rotors that are all alike, whose axial inertia the papers' H leaves out."""
 
-    axes: Array
+    axes: Array = np.zeros((0, 3))
     """Unit spin axes, body axes, shape (n, 3)."""
-    centres: Array
+    centres: Array = np.zeros((0, 3))
     """Of mass, body axes [m], shape (n, 3)."""
-    mass: float
+    mass: float = 0.0
     """Of each [kg]."""
-    inertia: float
+    inertia: float = 0.0
     """Axial, of each [kg m^2]."""
-    transverse_inertia: float
+    transverse_inertia: float = 0.0
     """About any axis through its centre across the spin axis [kg m^2]."""
+    speed_limit: float = np.inf
+    """Largest speed relative to the bus [rad/s]."""
 
 
 def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Inertial:
@@ -108,6 +111,8 @@ def bus(table: PlantTable, wheels: Rotors, own: Array) -> tuple[Inertial, Array]
 
 def principal(inertia: Array) -> tuple[Array, Array]:
     """Return the principal moments (3,), ascending, and axes (4,) of an inertia matrix (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # right-handed
     return moments, Rotation.from_matrix(axes).as_quat(scalar_first=True)
@@ -149,6 +154,8 @@ def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inert
 
 def tensor(inertia: Array, iquat: Array) -> Array:
     """Return the inertia matrix [kg m^2] of principal moments (3,) and axes (4,), shape (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
     axes = Rotation.from_quat(iquat, scalar_first=True).as_matrix()
     result: Array = axes @ np.diag(inertia) @ axes.T
     return result
@@ -165,6 +172,8 @@ def _too_much(inertia: Array, room: Array, across: Array, wheels: Rotors) -> str
     if np.linalg.eigvalsh(room)[0] <= 0.0:
         cure = "use lighter wheels or place them nearer to the centre of mass"
     else:
+        from scipy.linalg import eigh
+
         fits = wheels.transverse_inertia / eigh(across, room, eigvals_only=True)[-1]
         cure = (
             f"use a wheel inertia below {2.0 * fits:.4g} kg m^2"

@@ -79,7 +79,8 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
     spec.nuserdata = userdata
 
-    rotors = table.wheels.rotors
+    on_bus = [fitted.rotors for fitted in table.equipment.values() if fitted.rotors is not None]
+    rotors = on_bus[0] if on_bus else mass_properties.Rotors()
     if table.vehicle_mass is not None:
         gyrostat = np.array(table.vehicle_inertia)
         inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, _others(spec))
@@ -96,7 +97,7 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
         wheel_axes=indices.frozen(rotors.axes),
         wheel_inertia=indices.frozen(np.full(len(rotors.axes), rotors.inertia)),
         driven=driven,
-        speed_limit=table.wheels.speed_limit or np.inf,
+        speed_limit=rotors.speed_limit,
         **indices.of(model, driven),
     )
 
@@ -163,15 +164,20 @@ def _set_joints(model: Any, data: Any, initial: Initial) -> None:
         data.qvel[model.jnt_dofadr[known[name]]] = value
 
 
-def to_bytes(model: Any) -> bytes:
-    """Return the compiled model as gzipped MJB: equal models give equal bytes."""
+def to_mjb(model: Any) -> bytes:
+    """Return the compiled model as MJB: equal models give equal bytes."""
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
-    return gzip.compress(buffer.tobytes(), compresslevel=3, mtime=0)
+    return buffer.tobytes()
+
+
+def packed(mjb: bytes) -> bytes:
+    """Return a compiled model gzipped: equal models give equal bytes."""
+    return gzip.compress(mjb, compresslevel=3, mtime=0)
 
 
 def from_bytes(data: bytes) -> Any:
-    """Return the ``mujoco.MjModel`` that ``to_bytes`` wrote."""
+    """Return the ``mujoco.MjModel`` that was ``packed``."""
     return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": gzip.decompress(data)})
 
 

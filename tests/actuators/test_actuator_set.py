@@ -140,7 +140,7 @@ def test_an_actuators_fault_is_reported_as_its_own(
 def test_so_is_one_in_its_measurement() -> None:
     broken = ActuatorSet((BrokenSensor(np.eye(3)),))
     with pytest.raises(FlightError, match=r"the actuator BrokenSensor .* raised KeyError at "):
-        broken.seen({}, TRUTH)
+        broken.measured({}, TRUTH)
 
 
 @pytest.mark.parametrize("other", [ReactionWheels(np.eye(3)[:1]), CoilSet(np.eye(3))])

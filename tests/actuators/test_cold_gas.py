@@ -2,53 +2,29 @@
 
 from importlib import resources
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from thruster_samples import FORCE, PERIOD, STEP, TRUTH, built, check_batch, fire, layout
 
-from mjspace.actuators.base import Context
 from mjspace.actuators.cold_gas import ColdGas, ColdGasThrusters
 from mjspace.constants import STANDARD_GRAVITY
-from mjspace.contract import Array, Measurement, PulseCommand
+from mjspace.contract import Array, PulseCommand
 from mjspace.errors import InputError
 from mjspace.runner.replay import verify
 from mjspace.runner.run import fly_to_log
-from mjspace.scenario.equipment import Driven
 from mjspace.scenario.loading import load, validate
-from mjspace.scenario.plant import Initial, Rates
 from mjspace.simulation.assembly import assemble
 
-STEP, PERIOD, FORCE, ISP, GAS = 0.005, 0.02, 2.0, 70.0, 0.05  # s, s, N, s, kg
+ISP, GAS = 70.0, 0.05  # s, kg
 SPEED = ISP * STANDARD_GRAVITY
-TANK = """<mujoco><worldbody><body name="cold_gas_tank">
-  <inertial pos="0 0 0" mass="0.05" diaginertia="2e-4 2e-4 2e-4"/></body></worldbody></mujoco>"""
-NOTHING = np.zeros((1, 0))
-TRUTH = Measurement(thrust=NOTHING, propellant=NOTHING)
 
 
 def thrusters(count: int = 1, **keys: Any) -> ColdGasThrusters:
-    table = ColdGas(
-        positions=[[0.0, 0.0, 0.0]] * count, directions=[[1.0, 0.0, 0.0]] * count, thrust=FORCE,
-        specific_impulse=ISP, gas=GAS, **keys,
-    )  # fmt: skip
-    vehicle: Any = SimpleNamespace(model=mujoco.MjModel.from_xml_string(TANK))
-    rates = Rates(physics=STEP, control=PERIOD)
-    return table.actuator(Context(vehicle, Driven(), rates, Initial()))
-
-
-def fire(flown: ColdGasThrusters, on_times: Any) -> tuple[Any, Array, Array]:
-    """Return (state, impulse of each step [N s], saturated) of periods with these on-times."""
-    state, impulses, cuts = flown.reset(1), [], []
-    for on in on_times:
-        for _ in range(4):
-            state, mean, cut = flown.act(state, PulseCommand(np.atleast_2d(on)), TRUTH, STEP)
-            impulses.append(mean[0] * STEP)
-            cuts.append(cut[0])
-    return state, np.array(impulses), np.array(cuts)
+    table = ColdGas(**layout(count), specific_impulse=ISP, gas=GAS, **keys)
+    return built(table, "cold_gas_tank", mass=GAS, inertia=2e-4)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.4, 5.0 / 3.0])
@@ -100,18 +76,7 @@ def test_a_valve_closes_within_a_step_and_the_least_pulse_is_kept() -> None:
 
 def test_valves_share_one_tank_and_a_batch_is_its_vehicles() -> None:
     flown = thrusters(3, exponent=1.4)
-    random = np.random.default_rng(2)
-    every, alone = flown.reset(4), [flown.reset(1) for _ in range(4)]
-    for _ in range(8):
-        on_time = random.uniform(-0.01, 0.025, (4, 3))
-        for _ in range(4):
-            every, mean, _ = flown.act(every, PulseCommand(on_time), TRUTH, STEP)
-            for i in range(4):
-                one = PulseCommand(on_time[i : i + 1])
-                alone[i], mean_one, _ = flown.act(alone[i], one, TRUTH, STEP)
-                np.testing.assert_array_equal(mean[i], mean_one[0])
-    for name, values in every.items():
-        np.testing.assert_array_equal(values, np.concatenate([one[name] for one in alone]))
+    check_batch(flown)
     # Three valves together empty the tank as one does that is open three times as long.
     together, _, _ = fire(flown, [[0.02, 0.02, 0.02]] * 2)
     one_by_one, _, _ = fire(flown, [[0.02, 0.0, 0.0]] * 6)
@@ -143,10 +108,10 @@ def test_a_satellite_is_turned_by_gas_and_its_log_is_flown_again(tmp_path: Path)
     folder = Path(str(resources.files("mjspace.scenarios")))
     table = load("rcs-three-axis", ["duration=2", "checks=[]"])[0].model_dump(exclude_none=True)
     rcs = table["plant"].pop("rcs")
-    layout = {key: rcs[key] for key in ("positions", "directions", "thrust")}
-    table["plant"]["cold_gas"] = {**layout, "specific_impulse": ISP, "gas": GAS, "exponent": 1.4}
-    built = assemble(validate(table, "cold gas"), folder)
-    flown = fly_to_log(built, tmp_path / "flight.mcap")
+    where = {key: rcs[key] for key in ("positions", "directions", "thrust")}
+    table["plant"]["cold_gas"] = {**where, "specific_impulse": ISP, "gas": GAS, "exponent": 1.4}
+    assembly = assemble(validate(table, "cold gas"), folder)
+    flown = fly_to_log(assembly, tmp_path / "flight.mcap")
     truth, command = flown.log.read("/truth"), flown.log.read("/command")
     assert np.linalg.norm(truth["rate"][-1]) > 3e-4  # it turns
     used = truth["propellant"][0, 0] - truth["propellant"][-1, 0]
@@ -162,7 +127,7 @@ def test_a_satellite_is_turned_by_gas_and_its_log_is_flown_again(tmp_path: Path)
 def test_an_unphysical_polytrope_is_refused_in_one_line() -> None:
     table = load("rcs-three-axis")[0].model_dump(exclude_none=True)
     rcs = table["plant"].pop("rcs")
-    layout = {key: rcs[key] for key in ("positions", "directions", "thrust")}
-    table["plant"]["cold_gas"] = {**layout, "exponent": 0.9}
+    where = {key: rcs[key] for key in ("positions", "directions", "thrust")}
+    table["plant"]["cold_gas"] = {**where, "exponent": 0.9}
     with pytest.raises(InputError, match=r"plant\.cold_gas\.exponent: got 0\.9, should be greater"):
         validate(table, "file.toml")

@@ -1,48 +1,30 @@
 """Reaction-control thrusters: pulses, lag, tank and composition, against closed forms."""
 
-from types import SimpleNamespace
 from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
+import thruster_samples
 from pydantic import ValidationError
+from thruster_samples import FORCE, PERIOD, STEP, TRUTH, built, check_batch, layout
 
-from mjspace.actuators.base import Context
 from mjspace.actuators.thrusters import Rcs, Thrusters
 from mjspace.constants import STANDARD_GRAVITY
-from mjspace.contract import Array, Measurement, PulseCommand
-from mjspace.scenario.equipment import Driven
-from mjspace.scenario.plant import Initial, PlantTable, Rates
+from mjspace.contract import Array
+from mjspace.scenario.plant import PlantTable, Rates
 from mjspace.vehicle.vehicle import build, on_model
-
-STEP, PERIOD, FORCE = 0.005, 0.02, 2.0  # s, s, N
-TANK = """<mujoco><worldbody><body name="rcs_tank">
-  <inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"""
-NOTHING = np.zeros((1, 0))
-TRUTH = Measurement(
-    attitude=NOTHING, rate=NOTHING, wheel_speed=NOTHING, thrust=NOTHING, propellant=NOTHING
-)
 
 
 def thrusters(count: int = 1, **keys: Any) -> Thrusters:
-    rows = [[0.0, 0.0, 0.0]] * count
-    table = Rcs(positions=rows, directions=[[1.0, 0.0, 0.0]] * count, thrust=FORCE, **keys)
-    vehicle: Any = SimpleNamespace(model=mujoco.MjModel.from_xml_string(TANK))
-    rates = Rates(physics=STEP, control=PERIOD)
-    return table.actuator(Context(vehicle, Driven(), rates, Initial()))
+    return built(Rcs(**layout(count), **keys), "rcs_tank", mass=0.5, inertia=0.01)
 
 
 def fire(flown: Thrusters, on_times: list[float], periods: int) -> tuple[Any, Array, Array]:
     """Return (state, impulse of each step [N s], whether cut) for pulses and then nothing."""
-    state, impulses, cuts = flown.reset(1), [], []
-    for on in [*on_times, *[0.0] * (periods - len(on_times))]:
-        for _ in range(4):
-            command = PulseCommand(np.array([[on]]))
-            state, mean, cut = flown.act(state, command, TRUTH, STEP)
-            impulses.append(mean[0, 0] * STEP)
-            cuts.append(cut[0, 0])
-    return state, np.array(impulses), np.array(cuts)
+    pulses = [*on_times, *[0.0] * (periods - len(on_times))]
+    state, impulse, cut = thruster_samples.fire(flown, pulses)
+    return state, impulse[:, 0], cut[:, 0]
 
 
 def test_a_valve_that_closes_within_a_step_gives_that_part_of_its_thrust() -> None:
@@ -130,18 +112,7 @@ def test_a_batch_is_its_vehicles() -> None:
     flown = thrusters(
         3, specific_impulse=220.0, propellant=2e-5, rise=0.01, delay=0.013, minimum_on=0.007
     )
-    random = np.random.default_rng(2)
-    every, alone = flown.reset(4), [flown.reset(1) for _ in range(4)]
-    for _ in range(8):
-        on_time = random.uniform(-0.01, 0.025, (4, 3))
-        for _ in range(4):
-            every, mean, _ = flown.act(every, PulseCommand(on_time), TRUTH, STEP)
-            for i in range(4):
-                one = PulseCommand(on_time[i : i + 1])
-                alone[i], mean_one, _ = flown.act(alone[i], one, TRUTH, STEP)
-                np.testing.assert_array_equal(mean[i], mean_one[0])
-    for name, values in every.items():
-        np.testing.assert_array_equal(values, np.concatenate([one[name] for one in alone]))
+    every = check_batch(flown)
     assert (every["rcs_propellant"] == 0.0).any()
 
 

@@ -19,7 +19,8 @@ import pytest
 from mjspace import attitude as att
 from mjspace.contract import Array, Measurement, Reference, TorqueCommand
 from mjspace.scenario.construct import controllers
-from mjspace.scenario.loading import load, scenario_names
+from mjspace.scenario.files import scenario_names
+from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
@@ -183,13 +184,14 @@ def is_finite(law: Any, period: float, instants: Any) -> None:
 
 
 def is_batched(law: Any, period: float, instants: Any) -> None:
-    """Each vehicle of a batch gets, bit for bit, what it gets alone."""
+    """Each vehicle of a batch gets, bit for bit, what it gets alone, with its axis or without."""
     batch = leaves(outcome(law, period, instants))
     for index in range(COUNT):
-        part = slice(index, index + 1)
-        lone = [(measured._map(itemgetter(part)), desired) for measured, desired in instants]
-        for one, many in zip(leaves(outcome(law, period, lone)), batch, strict=True):
-            assert np.array_equal(one, many[part] if many.size else many, equal_nan=True)
+        for part in (slice(index, index + 1), index):
+            lone = [(measured._map(itemgetter(part)), desired) for measured, desired in instants]
+            for one, many in zip(leaves(outcome(law, period, lone)), batch, strict=True):
+                expected = many[part] if many.size else one[:0]
+                assert np.array_equal(one, expected, equal_nan=True)
 
 
 def flipped(instants: Any) -> Any:
@@ -327,6 +329,13 @@ class Averages(Damper):
         return state, TorqueCommand(command.torque + command.torque.mean(axis=0)), signals
 
 
+class NeedsTheAxis(Damper):
+    def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
+        state, command, signals = super().step(state, time, measurement, reference)
+        total = np.linalg.norm(np.atleast_2d(command.torque), axis=1, keepdims=True)
+        return state, TorqueCommand(command.torque / total), signals
+
+
 class Unwinds(Damper):
     def step(self, state: Any, time: float, measurement: Any, reference: Any) -> Any:
         error = att.multiply(att.conjugate(reference.attitude), measurement.attitude)
@@ -355,6 +364,7 @@ BREAKS = [
     (is_finite, Divides),
     (is_finite, DivergesInside),
     (is_batched, Averages),
+    (is_batched, NeedsTheAxis),
     (takes_either_sign, Unwinds),
     (takes_either_sign, UnwindsInside),
     (needs_no_engine, Imports),

@@ -4,7 +4,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from unittest import TestCase
@@ -21,10 +21,12 @@ from mjspace import dm_env
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Measurement
 from mjspace.errors import InputError
-from mjspace.scenario.loading import load, scenario_names
+from mjspace.scenario.files import scenario_names
+from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import INTEGRATION, first_start
-from mjspace.simulation.loop import fly
+from mjspace.simulation.loop import fly as flight
+from mjspace.simulation.recording import Block
 from mjspace.vehicle.model_checks import ModelWarning
 from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
@@ -33,6 +35,8 @@ pytestmark = [
     for kind in (UnphysicalInertiaWarning, ModelWarning)
 ]
 
+Fly = Callable[[TimeStep, int], Any]
+"""Returns the command for a time step and the number of its control period."""
 A, INF = np.radians(20.0), np.inf
 SHORT = "duration=0.048"  # a whole number of all control periods here
 NOISY = [
@@ -130,20 +134,52 @@ def observed(built: Assembly, step: TimeStep) -> tuple[Measurement, Any]:
     return Measurement(**reported), desired
 
 
-def fly_law(environment: Any, built: Assembly) -> list[dict[str, Any]]:
-    """Fly an episode under the scenario's law and return /state and measurement of each period."""
-    step, memory, rows = environment.reset(), None, []
-    physics = environment.physics
-    while True:
+def by_law(built: Assembly) -> Fly:
+    """Return what commands as the scenario's law does; its inner loop at equal rates alone."""
+    law: Any = built.law
+    memory = None
+
+    def fly(step: TimeStep, number: int) -> Any:
+        nonlocal memory
+        time = number * built.scenario.rates.control
         measurement, reference = observed(built, step)
+        if step.first():
+            memory = law.reset(measurement, reference)
+        memory, command, _ = law.step(memory, time, measurement, reference)
+        if built.inner:
+            memory, command = law.inner(memory, time, command, measurement)
+        return command
+
+    return fly
+
+
+def by_log(blocks: list[Block]) -> Fly:
+    """Return what commands as a flight has logged."""
+    kind: Any = blocks[0].kinds["/command"]
+    columns = {name: joined(blocks, "/command", name) for name in kind._fields}
+
+    def fly(step: TimeStep, number: int) -> Any:
+        return kind(**{name: values[number] for name, values in columns.items()})
+
+    return fly
+
+
+def joined(blocks: list[Block], topic: str, name: str) -> Any:
+    """Return the rows of a field, without the vehicle axis."""
+    return np.concatenate([block.rows[topic][name][:, 0] for block in blocks])
+
+
+def episode(environment: Any, built: Assembly, fly: Fly) -> list[dict[str, Any]]:
+    """Fly an episode and return /state and measurement of each period."""
+    step, rows, physics = environment.reset(), [], environment.physics
+    taken = [name for kind in built.actuators.kinds for name in kind.takes]
+    while True:
+        measurement, _ = observed(built, step)
         reported = {f"measured_{n}": m[0] for n, m in measurement._asdict().items() if m.size}
         rows.append({"physics": physics.get_state(INTEGRATION), **physics.memory(), **reported})
         if step.last():
             return rows
-        if memory is None:
-            memory = built.law.reset(measurement, reference)
-        memory, command, _ = built.law.step(memory, physics.time(), measurement, reference)
-        taken = [name for kind in built.actuators.kinds for name in kind.takes]
+        command = fly(step, physics.period())
         step = environment.step(np.concatenate([getattr(command, n).ravel() for n in taken]))
 
 
@@ -174,8 +210,11 @@ AT_ONCE = [f"plant.parts.{side}.deployment.at=0.12" for side in ("east", "west")
         ),
         ("immersion-invariance", ["duration=0.55"]),  # more than a block of references
         ("rcs-schmitt", ["duration=0.3", "initial.rate=[0.1, 0.2, 0]"]),
+        ("rcs-three-axis", ["duration=1", "initial.rate=[0.01, 0.02, 0]"]),
         ("lander", ["duration=0.2"]),
+        ("lander-engine-lag", ["duration=0.2"]),
         ("cmg-slew", ["duration=0.2"]),
+        ("dgvscmg-tracking", ["duration=0.01", "rates.control='0.1 ms'"]),
         ("wheel-failure", FAILS),
         ("gravity-gradient-boom", ["plant.parts.boom.deployment.at=0.25", *OUT]),
         ("yo-yo-despin", [*AT_ONCE, "duration=0.8", "rates.physics=0.005", "rates.control=0.01"]),
@@ -186,30 +225,26 @@ AT_ONCE = [f"plant.parts.{side}.deployment.at=0.12" for side in ("east", "west")
         ),
     ],
     ids=[
-        *("ideal", "noisy", "euler", "disturbed", "long", "thrusters", "lander", "gimbals"),
-        *("faults", "boom", "yo-yo", "coils", "speed limit"),
+        *("ideal", "noisy", "euler", "disturbed", "long", "thrusters", "pulses", "lander", "lag"),
+        *("gimbals", "inner loop", "faults", "boom", "yo-yo", "coils", "speed limit"),
     ],
 )
-def test_the_law_flies_the_same_flight_bit_for_bit(
+def test_the_same_commands_are_the_same_flight_bit_for_bit(
     scenario: str, overrides: list[str], tmp_path: Path
 ) -> None:
     (tmp_path / "wind.py").write_text(WIND)
     overrides = [text.replace("wind.py", str(tmp_path / "wind.py")) for text in overrides]
     overrides.append("checks=[]")
     built = assemble(*load(scenario, overrides))
-    blocks = list(fly(built, first_start(built, [0])))
-    logged = {
-        name: np.concatenate([block.rows["/state"][name][:, 0] for block in blocks])
-        for name in blocks[0].rows["/state"]
-        if not name.startswith("law_")
-    }
-    logged |= {
-        f"measured_{n}": np.concatenate([block.rows["/measurement"][n][:, 0] for block in blocks])
-        for n in blocks[0].rows["/measurement"]
-    }
+    blocks = list(flight(built, first_start(built, [0])))
+    state = [name for name in blocks[0].rows["/state"] if not name.startswith("law_")]
+    logged = {name: joined(blocks, "/state", name) for name in state}
+    measured = blocks[0].rows["/measurement"]
+    logged |= {f"measured_{name}": joined(blocks, "/measurement", name) for name in measured}
     environment = dm_env.load(scenario, overrides)
-    for _ in range(2):  # the second episode starts where the first did
-        rows = fly_law(environment, built)
+    # An inner loop's commands are not logged. The second episode starts where the first did.
+    for fly in (by_law(built), by_law(built) if built.inner else by_log(blocks)):
+        rows = episode(environment, built, fly)
         assert rows[0].keys() == logged.keys()
         for name, values in logged.items():
             assert np.array([row[name] for row in rows]).tobytes() == values.tobytes(), name

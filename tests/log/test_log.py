@@ -2,7 +2,6 @@
 
 import tracemalloc
 from pathlib import Path
-from time import sleep
 from typing import Any
 
 import numpy as np
@@ -10,15 +9,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from log_samples import ATTACHMENTS, BLOCKS, METADATA, create, fly, rows, write_block
-from mcap.reader import NonSeekingReader, make_reader
-from mcap.records import Channel, Schema
-from mcap.stream_reader import StreamReader
+from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.contract import Array
-from mjspace.log.chunk import encode, message
+from mjspace.log import reader
+from mjspace.log.content import Content, read_content
 from mjspace.log.encoding import Fields, doubles, varint5
-from mjspace.log.file import LogFile
 from mjspace.log.reader import Log
 from mjspace.log.schema import PERIODIC, Scene
 from mjspace.log.writer import LogWriter
@@ -139,6 +136,31 @@ def test_a_window_holds_both_its_ends_and_every_nth_row_between(
     np.testing.assert_array_equal(read["law_p"], values["/state"]["law_p"][chosen])
 
 
+def test_topics_side_by_side_are_what_each_is_alone_and_each_chunk_is_read_once(
+    flown: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = Log(flown)
+    window: dict[str, Any] = {"start": 0.003, "end": 0.15, "every": 3}
+    alone = {
+        "/truth": log.read("/truth", ["attitude"], **window),
+        "/state": log.read("/state", **window),
+    }
+    read: list[int] = []
+
+    def noted(file: Any, place: Any, channels: Any) -> Content:
+        read.append(place.position)
+        return read_content(file, place, channels)
+
+    monkeypatch.setattr(reader, "read_content", noted)
+    together = log.read_topics({"/truth": ["attitude"], "/state": None}, **window)
+    assert len(read) == len(set(read)) == len(BLOCKS)
+    assert list(together) == list(alone)
+    for topic, columns in alone.items():
+        assert {n: c.tobytes() for n, c in together[topic].items()} == {
+            n: c.tobytes() for n, c in columns.items()
+        }
+
+
 @pytest.mark.parametrize(
     ("asked", "found"),
     [(-1.0, 0), (0.0, 0), (0.00649, 6), (0.00651, 7), (0.1071, 107), (99.0, 167)],
@@ -213,55 +235,6 @@ def test_reading_by_chunks_never_holds_the_log(tmp_path: Path) -> None:
 
     # 40 blocks of 0.4 MB; the peaks differ by what happens to be in flight, two blocks at most.
     assert peak(50) - peak(10) < 1_000_000
-
-
-def test_a_slow_disk_holds_up_the_flight_and_not_its_memory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    written = 0
-    ahead: list[int] = []
-
-    def slow(parts: Any, position: int) -> Any:
-        done = len(ahead)
-        for _ in range(2000):  # as slow as it takes for the flight to be two chunks ahead
-            if written >= min(done + 2, 8):
-                break
-            sleep(0.005)
-        sleep(0.005)  # and to go further, if it may
-        ahead.append(written - done)
-        return encode(parts, position)
-
-    monkeypatch.setattr("mjspace.log.file.encode", slow)
-    with create(tmp_path / "flight.mcap") as log:
-        for i in range(8):
-            write_block(log, 10 * i, 10)
-            written += 1
-    assert ahead == [2, 2, 2, 2, 2, 2, 2, 1]
-
-
-def test_a_slow_chunk_is_not_overtaken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor by what comes after all chunks: a file that is closed at once waits for them."""
-    begun: list[int] = []
-
-    def slow(parts: Any, position: int) -> Any:
-        begun.append(position)
-        sleep(0.1 if len(begun) == 1 else 0.0)
-        return encode(parts, position)
-
-    monkeypatch.setattr("mjspace.log.file.encode", slow)
-    path = tmp_path / "flight.mcap"
-    file = LogFile(path, [Schema(1, b"", "", "")], [Channel(1, "/a", "", {}, 1)], {}, {})
-    for k in range(2):
-        file.add_chunk([message(1, k, bytes(8))])
-    file.add_metadata("last", {})
-    file.add_chunk([message(1, 2, bytes(8))])
-    file.close()
-    with path.open("rb") as stream:
-        assert [m.log_time for *_, m in NonSeekingReader(stream).iter_messages(None)] == [0, 1, 2]
-        stream.seek(0)
-        kinds = [type(r).__name__ for r in StreamReader(stream, emit_chunks=True).records]
-    order = [kind for kind in kinds if kind in ("Chunk", "Metadata")]
-    assert order == ["Metadata", "Chunk", "Chunk", "Metadata", "Chunk"]
 
 
 @pytest.mark.parametrize(

@@ -205,7 +205,8 @@ def test_a_disk_that_fills_up_is_an_error_and_what_fitted_is_kept(
 def test_an_error_on_its_way_out_is_not_hidden_by_the_full_disk(tmp_path: Path) -> None:
     with room_for(0), pytest.raises(OSError, match="File too large"):
         create(tmp_path / "flight.mcap")
-    with room_for(8000):
+    fly_and(max, tmp_path / "whole.mcap")
+    with room_for((tmp_path / "whole.mcap").stat().st_size - 1):
         with pytest.raises(ZeroDivisionError):
             fly_and(divmod, tmp_path / "flight.mcap")
         with pytest.raises(OSError, match="File too large"):
@@ -214,7 +215,7 @@ def test_an_error_on_its_way_out_is_not_hidden_by_the_full_disk(tmp_path: Path) 
 
 def fly_and(function: Callable[[int, int], object], path: Path) -> None:
     with create(path) as log:
-        write_block(log, 0, 1000)
+        write_block(log, 0, 10)
         function(1, 0)
 
 
@@ -267,6 +268,22 @@ def test_a_damaged_chunk_does_not_matter_to_what_is_in_others(tmp_path: Path) ->
     content[second.chunk_start_offset + second.chunk_length // 2] ^= 0x10
     path.write_bytes(content)
     assert [event.message for event in Log(path).events()] == ["period 5"]
+
+
+def test_a_damaged_index_is_named(whole: Path) -> None:
+    with whole.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    first = summary.chunk_indexes[0]
+    content = bytearray(whole.read_bytes())
+    for position in first.message_index_offsets.values():
+        content[position + 9 + 6 + 8 + 7] ^= 0xFF  # of the first offset, its highest byte
+    path = whole.with_name("damaged.mcap")
+    path.write_bytes(content)
+    where = f"the index of the chunk at byte {first.chunk_start_offset + 9} is damaged"
+    for read in (Log(path).altered, lambda: Log(path).read("/truth")):
+        with pytest.raises(ValueError, match=where):
+            read()
 
 
 def test_messages_that_another_program_encoded_anew_are_not_misread(tmp_path: Path) -> None:

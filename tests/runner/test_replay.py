@@ -1,6 +1,7 @@
 """Flying again from the log alone."""
 
 import tomllib
+from collections import namedtuple
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -8,12 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from log_samples import rewritten
+from mjspace.controllers.landing import lander_estimator
 
 from mjspace.contract import Measurement, Reference
 from mjspace.errors import InputError
 from mjspace.log.encoding import doubles
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.runner.former_names import FORMER, as_logged
 from mjspace.runner.replay import (
     Difference,
     _other_streams,
@@ -90,6 +93,37 @@ def test_a_replay_writes_the_same_state(noisy: Result, tmp_path: Path) -> None:
     assert new.keys() == old.keys()
     for field in old:
         assert new[field].tobytes() == old[field].tobytes()
+
+
+def renamed(kind: Any) -> Any:
+    """Return the named tuple with the names that an earlier version gave its fields."""
+    return namedtuple(kind.__name__, [FORMER.get(field, field) for field in kind._fields])
+
+
+def test_a_log_from_before_fields_were_renamed_flies_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as earlier:
+        for name in ("VectoringState", "VectoringSignals"):
+            earlier.setattr(lander_estimator, name, renamed(getattr(lander_estimator, name)))
+        old = run("lander-estimated", overrides=["duration=0.1", "checks=[]"], out=tmp_path)
+    assert {"wanted_thrust", "believed_position"} <= old.log.topics["/law"].keys()
+    assert "law_believed_bias" in old.log.topics["/state"]
+    assert verify(old.path) is None
+    assert verify(old.path, start=0.06) is None
+    new = replay(old.path, tmp_path / "again", start=0.06).log
+    assert {"desired_thrust", "estimated_position"} <= new.topics["/law"].keys()
+    after, before = new.read("/state"), old.log.read("/state", start=0.06)
+    assert after["law_estimated_bias"].tobytes() == before["law_believed_bias"].tobytes()
+
+
+def test_a_field_of_ones_own_keeps_its_name() -> None:
+    own = {"/law": {"wanted": 1, "given": 2}, "/state": {"law_given": 3}}
+    assert as_logged(own, own) == own
+    now = {"/law": {"desired_speed": 1}, "/state": {"law_applied_torque": 3, "physics": 4}}
+    assert as_logged(now, now) == now
+    before = {"/law": {"wanted": 1}, "/state": {"law_given": 3, "physics": 4}}
+    assert as_logged(now, before) == before
 
 
 def test_a_difference_is_named(

@@ -11,6 +11,7 @@ from mjspace.attitude import rotation_angle
 from mjspace.contract import Measurement, Reference
 from mjspace.errors import FlightError
 from mjspace.scenario.loading import load
+from mjspace.simulation import loop
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start
 from mjspace.simulation.loop import fly
@@ -209,18 +210,41 @@ def test_a_law_that_cannot_be_flown_is_told_so(law: Path, trouble: str, message:
         flown(built)
 
 
-def test_stop_is_obeyed_at_once() -> None:
-    asked = 0
+OWN = """
+import numpy as np
+from typing import NamedTuple
+from mjspace.contract import TorqueCommand
+
+
+class Law:
+    def reset(self, measurement, reference):
+        return None
+
+    def step(self, state, time, measurement, reference):
+        turning = float(np.linalg.norm(measurement.rate)) > 1.0
+        return None, TorqueCommand(np.full(3, 0.1 if turning else 0.0)), None
+"""
+
+
+def test_stop_is_obeyed_at_once(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    calls = 0
 
     def stop() -> bool:
-        nonlocal asked
-        asked += 1
-        return asked > 20
+        nonlocal calls
+        calls += 1
+        return calls > 20
 
-    built = assembly("contraction-ideal")
+    built = assembly("contraction-ideal", "law={kind='own.py:Law'}", folder=tmp_path)
     blocks = list(fly(built, first_start(built, (0,)), stop=stop))
-    # Asked once more after each block, of which a slow machine makes more.
+    # Called once more after each block, of which a slow machine makes more.
     assert sum(len(block.time) for block in blocks) == 22 - len(blocks)
+
+
+def test_stop_is_obeyed_after_the_block_where_its_inside_is_compiled() -> None:
+    built = assembly("contraction-ideal")
+    (block,) = fly(built, first_start(built, (0,)), stop=lambda: True)
+    assert 1 <= len(block.time) <= loop.BLOCK_PERIODS
 
 
 def test_a_disturbance_of_ones_own_acts_and_is_logged(tmp_path: Path) -> None:

@@ -174,7 +174,10 @@ def push(time, truth):
         flown(tmp_path, code, *orbit)
 
 
-def test_a_reference_cannot_change_what_it_has_returned(tmp_path: Path) -> None:
+def test_a_reference_cannot_change_what_it_has_returned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", 10)  # it is asked in each block
     code = (
         law(GOOD)
         + """
@@ -231,6 +234,8 @@ def test_a_wrong_return_is_named(tmp_path: Path, step: str, message: str) -> Non
 LINE = HEAD.count("\n") + 3
 """Of the first line of a law's ``step``, in own.py."""
 
+FLIGHT_ERROR = "from mjspace.errors import FlightError"
+
 
 @pytest.mark.parametrize("batched", ["true", "false"])
 @pytest.mark.parametrize(
@@ -242,6 +247,11 @@ LINE = HEAD.count("\n") + 3
         ("deep = lambda: 1 / 0\n    return deep()", "ZeroDivisionError at own.py:{line}: div"),
         ("return {}['gain']", "KeyError at own.py:{line}: 'gain'"),
         ("raise ValueError('one\\n  two')", "ValueError at own.py:{line}: one two"),
+        (f"{FLIGHT_ERROR}; raise FlightError('lost')", "FlightError at own.py:{line}: lost"),
+        (
+            f"{FLIGHT_ERROR}; raise type('Lost', (FlightError,), {{}})('far')",
+            "Lost at own.py:{line}: far",
+        ),
     ],
 )
 def test_what_a_law_raises_has_its_file_and_line(

@@ -13,9 +13,9 @@ from mjspace.contract import Array
 from mjspace.errors import NoRendererError
 from mjspace.rendering import plume
 from mjspace.rendering.offscreen import Canvas
-from mjspace.scenario.landing import Ground
 from mjspace.scenario.plant import PlantTable
 from mjspace.vehicle import composition
+from mjspace.vehicle.ground import Ground
 
 ASSETS = Path(__file__).parents[2] / "assets"
 GROUNDS = ["moon_plain", "moon_craters"]

@@ -1,42 +1,19 @@
 """The cascade without sensors on its wheel: what it may not know, and what it finds out."""
 
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
 import pytest
+from dgvscmg_samples import AT_REST, RATES, measured
 from mjspace.controllers.cmg.dgvscmg import Cascade
 from mjspace.controllers.cmg.dgvscmg_sensorless import Sensorless
 from mjspace.controllers.motors.sensorless import turned
 
-from mjspace.contract import Array, Measurement, Reference
+from mjspace.contract import Array, Measurement
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
-
-BUS = np.array([[10.5, 0.22, 0.47], [0.22, 12.5, 0.36], [0.47, 0.36, 13.6]])
-AT_REST = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
-RATES = {"inertia": BUS, "control_period": 1e-3, "inner_period": 1e-4}
-
-
-def seen(vehicles: int) -> Measurement:
-    random = np.random.default_rng(0)
-    q = random.normal(size=(vehicles, 4))
-    return Measurement(
-        attitude=q / np.linalg.norm(q, axis=1, keepdims=True),
-        rate=0.1 * random.normal(size=(vehicles, 3)),
-        wheel_speed=73.0 + random.normal(size=(vehicles, 1)),
-        gimbal_angle=0.3 * random.normal(size=(vehicles, 2)),
-        gimbal_rate=random.normal(size=(vehicles, 2)),
-        current=random.normal(size=(vehicles, 3, 2)),
-    )
-
-
-def one(arrays: Any, index: int) -> Any:
-    if isinstance(arrays, Measurement):
-        return arrays._map(itemgetter(index))
-    return type(arrays)(*(a[index] if a.size else a for a in arrays))
 
 
 def flown(law: Any, measurement: Measurement) -> list[Any]:
@@ -48,25 +25,17 @@ def flown(law: Any, measurement: Measurement) -> list[Any]:
 
 
 def test_nothing_comes_of_the_wheel_s_sensors() -> None:
-    blind = seen(3)._replace(wheel_speed=np.full((3, 1), np.nan), wheel_angle=np.full((3, 1), 9.0))
-    for a, b in zip(
-        flown(Sensorless(**RATES), seen(3)), flown(Sensorless(**RATES), blind), strict=True
-    ):
+    whole = measured(3, wheel_speed=73.0)
+    blind = whole._replace(wheel_speed=np.full((3, 1), np.nan), wheel_angle=np.full((3, 1), 9.0))
+    law = Sensorless(**RATES)
+    for a, b in zip(flown(law, whole), flown(law, blind), strict=True):
         np.testing.assert_array_equal(a, b)
         assert np.isfinite(a).all()
 
 
-def test_a_vehicle_is_the_same_alone_and_in_a_batch() -> None:
-    many = seen(6)
-    batch = flown(Sensorless(**RATES), many)
-    for index in range(6):
-        for a, b in zip(flown(Sensorless(**RATES), one(many, index)), batch, strict=True):
-            np.testing.assert_array_equal(a, b[index])
-
-
 def test_with_the_right_beliefs_it_does_what_the_cascade_does() -> None:
     """No current, angle zero, the speed believed: the same voltages, one set on windings."""
-    still = seen(2)._replace(
+    still = measured(2, wheel_speed=73.0)._replace(
         wheel_speed=np.full((2, 1), 73.0), current=np.zeros((2, 3, 2)), gimbal_rate=np.zeros((2, 2))
     )
     sensed, law = Cascade(**RATES), Sensorless(**RATES)
@@ -86,7 +55,7 @@ def test_with_the_right_beliefs_it_does_what_the_cascade_does() -> None:
 
 
 def test_the_observer_is_told_of_the_voltage_that_the_supply_gives() -> None:
-    state = flown(Sensorless(**RATES, voltage_limit=50.0), seen(3))
+    state = flown(Sensorless(**RATES, voltage_limit=50.0), measured(3, wheel_speed=73.0))
     voltage, applied = state[4], state[-1]
     np.testing.assert_allclose(np.hypot(*voltage[:, 0].T), 50.0, rtol=1e-14)
     np.testing.assert_array_equal(applied[:, 2:], voltage)

@@ -1,37 +1,21 @@
 """Unloading of the CMG's wheel: what thrusters and wheel do, the bus does not feel."""
 
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
+from dgvscmg_samples import AT_REST, RATES, measured
 from mjspace.controllers.cmg import steering
 from mjspace.controllers.cmg.dgvscmg import Cascade
 from mjspace.controllers.cmg.dgvscmg_unloading import Unloading
 
 from mjspace import attitude
-from mjspace.contract import Measurement, Reference
+from mjspace.contract import Measurement
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
 
-BUS = np.array([[10.5, 0.22, 0.47], [0.22, 12.5, 0.36], [0.47, 0.36, 13.6]])
-AT_REST = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
-RATES = {"inertia": BUS, "control_period": 1e-3, "inner_period": 1e-4}
 JW = 0.016
-
-
-def seen(vehicles: int) -> Measurement:
-    random = np.random.default_rng(0)
-    q = random.normal(size=(vehicles, 4))
-    return Measurement(
-        attitude=q / np.linalg.norm(q, axis=1, keepdims=True),
-        rate=0.1 * random.normal(size=(vehicles, 3)),
-        wheel_speed=90.0 + 10.0 * random.normal(size=(vehicles, 1)),
-        gimbal_angle=0.3 * random.normal(size=(vehicles, 2)),
-        gimbal_rate=random.normal(size=(vehicles, 2)),
-        current=random.normal(size=(vehicles, 3, 2)),
-    )
 
 
 def asked(law: Any, measurement: Measurement) -> Any:
@@ -39,7 +23,7 @@ def asked(law: Any, measurement: Measurement) -> Any:
 
 
 def test_the_bus_feels_neither_thrusters_nor_wheel() -> None:
-    measurement = seen(20)
+    measurement = measured(20, wheel_speed=90.0, spread=10.0)
     command = asked(Unloading(**RATES, unloading_gain=0.05), measurement)
     plain = asked(Cascade(**RATES), measurement)
     np.testing.assert_array_equal(command.gimbal_rate, plain.gimbal_rate)
@@ -54,17 +38,9 @@ def test_the_bus_feels_neither_thrusters_nor_wheel() -> None:
 
 
 def test_thrusters_are_asked_for_no_more_than_they_have() -> None:
-    torque = asked(Unloading(**RATES, unloading_gain=9.0), seen(20)).thruster_torque
+    measurement = measured(20, wheel_speed=90.0, spread=10.0)
+    torque = asked(Unloading(**RATES, unloading_gain=9.0), measurement).thruster_torque
     np.testing.assert_allclose(np.linalg.norm(torque, axis=1), 0.1, rtol=1e-12)
-
-
-def test_a_vehicle_is_the_same_alone_and_in_a_batch() -> None:
-    law, many = Unloading(**RATES), seen(6)
-    batch = asked(law, many)
-    for index in range(6):
-        one = many._map(itemgetter(index))
-        for a, b in zip(asked(law, one), batch, strict=True):
-            np.testing.assert_array_equal(a, b[index])
 
 
 def test_momentum_leaves_by_the_thrusters_alone() -> None:

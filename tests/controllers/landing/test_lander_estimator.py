@@ -77,14 +77,14 @@ def descent(source: Any, rows: int) -> Iterator[Measurement]:
 
 def errors(estimate: FilterState, truth: Measurement, sensors: Sensors) -> Array:
     """Return truth less estimate, in the filter's order, (n, 15)."""
-    turn = att.multiply(att.conjugate(estimate.believed_attitude), truth.attitude)
+    turn = att.multiply(att.conjugate(estimate.estimated_attitude), truth.attitude)
     biases = np.concatenate([sensors.force_bias, sensors.gyro_bias], axis=1)
     parts = [
-        truth.position - estimate.believed_position,
-        truth.velocity - estimate.believed_velocity,
+        truth.position - estimate.estimated_position,
+        truth.velocity - estimate.estimated_velocity,
     ]
     return np.concatenate(
-        [*parts, att.to_rotation_vector(turn), biases - estimate.believed_bias], 1
+        [*parts, att.to_rotation_vector(turn), biases - estimate.estimated_bias], 1
     )
 
 

@@ -88,4 +88,4 @@ def test_vectoring_asks_for_no_more_than_its_limit(error: float) -> None:
     )
     _, _, signals = law.step(law.reset(seen, now), 200.0, seen, now)
     needed = 100.0 * (MU / (MOON_RADIUS + place[2]) ** 2 + now.linear_acceleration[2])
-    assert signals.wanted_thrust[0] - needed == pytest.approx(-30.0 * np.sign(error), abs=1e-6)
+    assert signals.desired_thrust[0] - needed == pytest.approx(-30.0 * np.sign(error), abs=1e-6)

@@ -117,14 +117,44 @@ def test_the_table_as_flown_has_every_gain_of_every_law() -> None:
     assert again.phases[0].until.below == 0.1
 
 
+def test_the_end_of_a_phase_takes_quantities() -> None:
+    until = {"after": "0.5 min", "signal": "rate", "below": "6 deg/s", "above": "10 mrad"}
+    law, flown = built([{**TABLE[0], "until": until}, *TABLE[1:]])
+    end = law.phases[0].until
+    assert (end.after, end.above) == (30.0, 0.01)
+    assert end.below == pytest.approx(np.pi / 30, rel=1e-15)
+    assert flown.gains["phases"][0]["until"] == {
+        "after": 30.0, "signal": "rate", "below": end.below, "above": 0.01
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"law": {"kind": "coast:Coat"}}, r"phases.0.law: 'coast' has no 'Coat': did you mean 'C"),
         ({"law": {"kind": "quaternion_feedback:RateDamping", "rate_gian": 1}}, "phases.0.law: rat"),
         ({"law": {"kind": "own.py:Law"}}, "phases.0.law: own.py:Law: a law within another comes"),
-        ({"until": {"signal": "rate[x]", "below": 1}}, r"phases.0: until.signal: got 'rate\[x\]'"),
+        ({"until": {"signal": "rate[x]", "below": 1}}, r"phases.0.until: signal: got 'rate\[x\]'"),
         ({"until": {"signal": "rate"}}, "a signal and below or above go together"),
+        (
+            {"until": {"after": "10 deg"}},
+            "phases.0.until: after: '10 deg' has the unit 'deg', should",
+        ),
+        ({"until": {"after": -1}}, "phases.0.until: after: got -1 s, should be 0 or more"),
+        (
+            {"until": {"afer": 1}},
+            "phases.0.until: afer: Until has no such key: did you mean 'after'",
+        ),
+        (
+            {"until": {"signal": "rate", "below": "1 dge/s"}},
+            "until: below: .* unknown unit 'dge/s'",
+        ),
+        (
+            {"until": 3},
+            "phases.0: until: got 3, should be a table with after, signal, below, above",
+        ),
+        ({"law": "coast:Coast"}, "phases.0: law: should be a table with the kind of a law that"),
+        ({"name": "Damp"}, "phases.0: name: got 'Damp', should be a word in lower case"),
         ({"until": None}, "phases.0: 'damp' would never end: it needs an until"),
         ({"name": "wait"}, "phases: got .*, should be one or more, with different names"),
         ({"nmae": "damp"}, "phases.0: .*nmae"),

@@ -1,0 +1,41 @@
+"""The ground below a vehicle: its table in a scenario, and how it is laid into the model."""
+
+import math
+from typing import Annotated, Any
+
+import mujoco
+import numpy as np
+from pydantic import Field
+
+from mjspace.scenario.fields import NonNegative, Si, Table, WithinTurn
+from mjspace.vehicle import ground_contact
+from mjspace.vehicle.composition import ASSETS
+
+
+class Ground(Table):
+    """What the vehicle lands on."""
+
+    part: str = "moon_plain"
+    """Name of a folder in assets/parts/ with a geom called ``ground``."""
+    slope: Annotated[NonNegative, Field(lt=0.5 * math.pi), Si("rad")] = 0.0
+    """How steep it is at the site."""
+    downhill: WithinTurn = 0.0
+    """Where the slope leads down to: from x towards y."""
+
+    def attach(self, spec: Any) -> None:
+        """Lay the ground through the origin of the vehicle's ``MjSpec``, sloping ``downhill``.
+
+        Raises:
+            ValueError: no such part.
+        """
+        file = ASSETS / f"parts/{self.part}/{self.part}.xml"
+        if not file.is_file():
+            known = ", ".join(
+                sorted(path.parent.name for path in ASSETS.glob("parts/moon_*/*.xml"))
+            )
+            raise ValueError(f"plant.ground.part: no part {self.part!r}: have {known}")
+        across = [-np.sin(self.downhill), np.cos(self.downhill), 0.0]
+        frame = spec.worldbody.add_frame()
+        mujoco.mju_axisAngle2Quat(frame.quat, np.array(across), self.slope)
+        spec.attach(mujoco.MjSpec.from_file(str(file)), prefix="site_", frame=frame)
+        ground_contact.add_sensors(spec, "site_ground")
