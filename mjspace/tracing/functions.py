@@ -23,7 +23,7 @@ def apply(program: Program, function: Any, args: tuple[Any, ...], kwargs: dict[s
     """
     name = f"np.{function.__name__}"
     try:
-        if function in _MOVES:
+        if function in MOVES:
             data, *others = args
             _refuse_arrays(program, name, others, kwargs)
             return move(program, lambda array: function(array, *others, **kwargs), data)
@@ -154,7 +154,7 @@ def _cross(program: Program, a: Any, b: Any) -> Any:
     # As NumPy computes it, component by component, along the last axis.
     (a0, a1, a2), (b0, b1, b2) = (
         [move(program, lambda each, k=k: each[..., k], vector) for k in range(3)]  # type: ignore[misc]
-        for vector in (a, b)
+        for vector in map(np.asarray, (a, b))
     )
     products = [(a1, b2, a2, b1), (a2, b0, a0, b2), (a0, b1, a1, b0)]
     components = [
@@ -216,7 +216,7 @@ def _shape_of(value: Any) -> Any:
     return np.broadcast_to(0.0, value.shape) if isinstance(value, np.ndarray) else value
 
 
-_MOVES: frozenset[Any] = frozenset({
+MOVES: frozenset[Any] = frozenset({
     np.atleast_1d, np.atleast_2d, np.broadcast_to, np.column_stack, np.concatenate, np.copy,
     np.diagonal, np.expand_dims, np.flip, np.hstack, np.moveaxis, np.ravel, np.repeat, np.reshape,
     np.roll, np.squeeze, np.stack, np.swapaxes, np.take, np.tile, np.transpose, np.vstack,

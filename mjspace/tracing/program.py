@@ -143,9 +143,14 @@ class Program:
         return np.ndarray(shape, kind, self._memory, offset, strides)
 
     def apply(self, ufunc: np.ufunc, operands: Sequence[_Array]) -> None:
-        """Take down a call on arrays of the memory, broadcast to the shape of the last."""
+        """Take down a call on arrays of the memory, broadcast to the shape of the last.
+
+        The last is gone through as it lies in the memory, which is how NumPy goes: the larger of 0
+        and -0 depends on how many elements are compared at once.
+        """
         shape = operands[-1].shape
-        views = [np.broadcast_to(each, shape) for each in operands]
+        order = np.argsort([-abs(step) for step in operands[-1].strides], kind="stable")
+        views = [np.broadcast_to(each, shape).transpose(order) for each in operands]
         for lead, (length, *steps) in _runs(views):
             self._call(ufunc, lead, (length,), steps)
 

@@ -34,6 +34,8 @@ class TracedArray(NDArrayOperatorsMixin):
         self.array, self.program = array, program
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        if ufunc is np.power and self._is_number and isinstance(inputs[0], np.generic):
+            self._refused("a power of one of NumPy's numbers, or np.power of it")
         outputs = options.get("out", ())
         if any(isinstance(each, TracedArray) and each._is_number for each in outputs):
             del options["out"]
@@ -42,7 +44,8 @@ class TracedArray(NDArrayOperatorsMixin):
         return self._applied(ufuncs.apply, ufunc, method, tuple(map(self._plain, inputs)), options)
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        first = map(self._plain_or_several, args[:1])
+        moves = function in functions.MOVES
+        first = map(self._plain_or_several if moves else self._plain, args[:1])
         others = tuple(map(self._plain, args[1:]))
         options = {name: self._plain(each) for name, each in kwargs.items()}
         return self._applied(functions.apply, function, (*first, *others), options)
@@ -89,6 +92,8 @@ class TracedArray(NDArrayOperatorsMixin):
     def __pow__(self, exponent: Any) -> Any:
         if self._is_number and _is_number(exponent):
             return ufuncs.power_of_numbers.ufunc(self, exponent)
+        if self._is_number and isinstance(exponent, np.generic):
+            self._refused("a power of a number whose exponent is one of NumPy's integers")
         if isinstance(exponent, TracedArray):
             return np.power(self, exponent)
         # An array's own shortcuts, such as np.square, differ from np.power in the last digit.
@@ -204,14 +209,15 @@ class TracedArray(NDArrayOperatorsMixin):
     def _as_array(self, *_: Any, **__: Any) -> NoReturn:
         self._refused("a NumPy array made of measured values, as np.array does: np.stack can be")
 
-    def _type(self) -> NoReturn:
-        self._refused("a branch on the type of a measured value")
+    def _stands_for(self) -> type:
+        """Return the class that ``isinstance`` is to see, that of the flight's array or number."""
+        return type(self.array[()]) if self._is_number else np.ndarray
 
     __bool__ = _in_branch
     __float__ = __int__ = __index__ = __complex__ = __round__ = item = tolist = _as_python
     __str__ = __format__ = __reduce_ex__ = _as_python
     __array__ = _as_array
-    __class__ = property(_type)
+    __class__ = property(_stands_for)
 
 
 class _Asked(np.ndarray):
@@ -224,4 +230,4 @@ class _Asked(np.ndarray):
 def _is_number(value: Any) -> bool:
     if isinstance(value, TracedArray):
         return value._is_number
-    return isinstance(value, (int, float, np.number))
+    return isinstance(value, (int, float))

@@ -30,7 +30,7 @@ def power_of_numbers(base: Any, exponent: Any, result: Any) -> None:
 
 def apply(
     program: Program,
-    ufunc: np.ufunc,
+    ufunc: Any,
     method: str,
     inputs: tuple[Any, ...],
     options: dict[str, Any],
@@ -40,6 +40,10 @@ def apply(
     Raises:
         Untraceable: another method, or an option that cannot be taken down.
     """
+    if not isinstance(ufunc, np.ufunc):  # of numba.vectorize, around one
+        ufunc = getattr(ufunc, "ufunc", None)
+        if not isinstance(ufunc, np.ufunc):
+            raise Untraceable("a function that is like a ufunc, and is none")
     outputs = options.pop("out", None)
     if method == "reduce" and outputs is None:
         return reduce(program, ufunc, inputs[0], *inputs[1:], **options)
