@@ -15,7 +15,7 @@ from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
-from mjspace.simulation.hidden_memory import copied, refuse_hidden_memory
+from mjspace.simulation.hidden_memory import refusing_hidden_memory
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
@@ -93,7 +93,10 @@ def compile_period(
     try:
         with np.errstate(all="ignore"):
             tracing = _Tracing(assembly, layout, example, reference)
-            return tracing.with_law() if law else tracing.of_command(example.command)
+            if not law:
+                return tracing.of_command(example.command)
+            with refusing_hidden_memory(tracing.law) as tracing.law:
+                return tracing.with_law()
     except FlightError as error:
         # Says which actuator, and where.
         raise Untraceable(str(error)) from error
@@ -121,7 +124,7 @@ class _Tracing:
         self.inputs += self.reference
         self.suite = assembly.sensors([0])
         law = assembly.law
-        self.written_law: Any = law.law if isinstance(law, UnbatchedLaw) else law
+        self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
 
     def with_law(self) -> CompiledPeriod:
         """Return the program of sensors, law and actuators.
@@ -129,7 +132,6 @@ class _Tracing:
         Raises:
             Untraceable: as ``compile_period``; or the sensors err.
         """
-        self.law = copied(self.written_law)
         if self.suite.ticks:
             raise Untraceable("sensors err, or sample at times of their own")
         with self.program.section() as sensing:
@@ -236,14 +238,12 @@ class _Tracing:
         state, reference = self._all_traced(self.law_state), self._all_traced(self.reference)
         with _of_the_law():
             after, command, signals = step(state, self._traced(self.time), measurement, reference)
-        refuse_hidden_memory(self.law, self.written_law)
         return after or (), command, signals or ()
 
     def _law_inner(self, command: Any, measurement: Any) -> tuple[Any, Any]:
         state = self._all_traced(self.law_state)
         with _of_the_law():
             after, motors = self.law.inner(state, self._traced(self.time), command, measurement)
-        refuse_hidden_memory(self.law, self.written_law)
         return after or (), motors
 
     def _held(self, array: Any) -> np.ndarray:
