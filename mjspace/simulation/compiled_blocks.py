@@ -2,7 +2,7 @@
 
 import time as clock
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,9 +32,16 @@ class CompiledBlocks:
     """
 
     def __init__(
-        self, assembly: Assembly, start: Start, stepper: Stepper, law: FlownLaw, threads: int
+        self,
+        assembly: Assembly,
+        start: Start,
+        members: Sequence[int],
+        stepper: Stepper,
+        law: FlownLaw,
+        threads: int,
     ) -> None:
-        self._assembly, self._start, self._threads = assembly, start, threads
+        self._assembly, self._start = assembly, start
+        self._members, self._threads = members, threads
         self._stepper, self._law = stepper, law
         self._period: CompiledPeriod
         self._flight: CompiledFlight | None = None
@@ -70,7 +77,7 @@ class CompiledBlocks:
         after, trouble = self._after_a_period(), None
         try:
             flight = self._flight or self._compile(first, desired)
-            flight.set(first.physics, first.memory, first.law)
+            flight.set(first.physics, first.memory, first.sensors, first.law)
             flight.begin(first.number, count, last, desired)
             if self._period.has_law:
                 flight.fly(count)
@@ -101,6 +108,8 @@ class CompiledBlocks:
             return columns, None
         self._take(flight)
         if self._period.has_law:
+            stepper = self._stepper
+            stepper.sensors = {name: values.copy() for name, values in flight.sensors.items()}
             kind: Any = type(flight.law)
             kept = [values.copy() for values in flight.law]
             self._law.state = kind(*kept) if kept else ()
@@ -161,7 +170,12 @@ class CompiledBlocks:
             self.reason = str(error)
             self._period = compile_period(*arguments, reference, law=False)
         self._flight = CompiledFlight(
-            self._assembly, self._stepper.layout, self._period, self._start, self._threads
+            self._assembly,
+            self._stepper.layout,
+            self._period,
+            self._start,
+            self._members,
+            self._threads,
         )
         return self._flight
 

@@ -56,9 +56,9 @@ def _same(one: Any, other: Any, depth: int = _DEPTH) -> bool:
     if type(one) is not type(other):
         return False
     if isinstance(one, np.ndarray):
-        return one.shape == other.shape and one.tobytes() == other.tobytes()
+        return bool(one.shape == other.shape and one.tobytes() == other.tobytes())
     if isinstance(one, _VALUES):
-        return bool(one == other or one != one)
+        return bool(one == other) or one != one
     if isinstance(one, set):
         return bool(one == other)
     if isinstance(one, _COLLECTIONS):

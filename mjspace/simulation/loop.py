@@ -101,7 +101,7 @@ class _Flight:
         self._law = FlownLaw(assembly.law, start.law, len(members))
         inner = self._law.inner if assembly.inner else None
         self.stepper = Stepper(assembly, start, members, threads=threads, inner=inner)
-        self.compiled = CompiledBlocks(assembly, start, self.stepper, self._law, threads)
+        self.compiled = CompiledBlocks(assembly, start, members, self.stepper, self._law, threads)
         # Each period, with law, signals and measurement.
         recorded = 4 * self.stepper.batch.state.nbytes
         self._periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
