@@ -1,14 +1,16 @@
 """NumPy's functions on arrays of a program's memory, besides ufuncs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mjspace.tracing import ufuncs
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.tracing.program import Program
 
+_Array = NDArray[Any]
 _BOOL, _FLOAT = np.dtype(bool), np.dtype(float)
 _clip: np.ufunc = np._core.umath.clip  # type: ignore[attr-defined]
 
@@ -19,62 +21,74 @@ def apply(program: Program, function: Any, args: tuple[Any, ...], kwargs: dict[s
     Raises:
         Untraceable: it is not among the functions that can be taken down.
     """
-    if function in _MOVES:
-        data, *others = args
-        _refuse_measured(program, function, *others, *kwargs.values())
-        return move(program, lambda array: function(array, *others, **kwargs), data)
-    if function in _REDUCTIONS:
-        return _reduced(program, _REDUCTIONS[function], *args, **kwargs)
-    if function in _ABOUT_SHAPES:
-        return function(*(_shape_of(each) for each in args), **kwargs)
-    if function not in _OWN:
-        raise Untraceable(f"np.{function.__name__}")
-    return _OWN[function](program, *args, **kwargs)
+    name = f"np.{function.__name__}"
+    try:
+        if function in _MOVES:
+            data, *others = args
+            _refuse_arrays(program, name, others, kwargs)
+            return move(program, lambda array: function(array, *others, **kwargs), data)
+        if function in _REDUCTIONS:
+            _refuse_arrays(program, name, args[1:], kwargs)
+            return _reduced(program, _REDUCTIONS[function], *args, **kwargs)
+        if function in _ABOUT_SHAPES:
+            return function(*(_shape_of(each) for each in args), **kwargs)
+        if function in _OWN:
+            return _OWN[function](program, *args, **kwargs)
+    except TypeError as error:
+        raise Untraceable(f"{name}: {error}") from error
+    raise Untraceable(name)
 
 
-def move(program: Program, function: Callable[[Any], np.ndarray], data: Any) -> np.ndarray:
+def move(program: Program, function: Callable[[Any], np.ndarray], data: Any) -> _Array:
     """Return what ``function`` makes of ``data``, an array or several, by moving elements alone.
 
     A view stays one. Else it is applied to the elements' places to see where each comes from.
     """
     several = isinstance(data, (list, tuple))
     arrays = [np.asarray(each) for each in (data if several else [data])]
-    kind = _BOOL if all(each.dtype == _BOOL for each in arrays) else _FLOAT
+    kind = np.result_type(*arrays)
+    if kind not in (_BOOL, _FLOAT):
+        raise Untraceable(f"an array of {kind}")
     held = [ufuncs.in_memory(program, each, kind) for each in arrays]
-    result = np.asarray(function(held if several else held[0]))
-    if program.holds(result):
+    result = function(held if several else held[0])
+    if isinstance(result, np.ndarray) and program.holds(result):
         return result
     places = [_places(program, each) for each in held]
-    sources = np.asarray(function(places if several else places[0])).ravel()
-    target = program.copied(result)
-    _gather(program, sources, target.reshape(-1))
+    sources = np.asarray(function(places if several else places[0]))
+    target = program.result(result)
+    by_stride = np.argsort([-step for step in target.strides], kind="stable")
+    _gather(program, *(each.transpose(by_stride).reshape(-1) for each in (sources, target)))
     return target
 
 
-def copy(program: Program, array: np.ndarray) -> np.ndarray:
-    """Return a copy of an array of the memory."""
+def copy(program: Program, array: _Array) -> _Array:
+    """Return a contiguous copy of an array of the memory."""
     target = program.copied(array)
+    target.setflags(write=array.flags.writeable or array.ndim > 0)  # of a number, a number
     program.copy(array, target)
     return target
 
 
-def assign(program: Program, array: np.ndarray, index: Any, value: Any) -> None:
+def assign(program: Program, array: _Array, index: Any, value: Any) -> None:
     """Take down ``array[index] = value``.
 
     Raises:
         Untraceable: the index picks elements one by one.
     """
-    target = array[index] if array.ndim else array
-    array[index] = value
+    target = array[index]
     if not isinstance(target, np.ndarray):
-        target = array[index, ...]
+        target = array[(*index, ...) if isinstance(index, tuple) else (index, ...)]
     if not program.holds(target):
         raise Untraceable("an assignment to elements one by one")
     source = ufuncs.in_memory(program, value, target.dtype)
-    program.copy(np.broadcast_to(source, target.shape), target)
+    if np.may_share_memory(source, target):
+        source = copy(program, source)
+    array[index] = value  # may raise what it raises
+    lost = range(source.ndim - target.ndim)  # NumPy drops leading axes of length 1
+    program.copy(np.broadcast_to(source.squeeze(axis=tuple(lost)), target.shape), target)
 
 
-def _places(program: Program, array: np.ndarray) -> np.ndarray:
+def _places(program: Program, array: _Array) -> _Array:
     """Return the offset of each element [bytes]."""
     places = np.full(array.shape, program.offset(array))
     for axis, (length, stride) in enumerate(zip(array.shape, array.strides, strict=True)):
@@ -84,7 +98,7 @@ def _places(program: Program, array: np.ndarray) -> np.ndarray:
     return places
 
 
-def _gather(program: Program, sources: np.ndarray, target: np.ndarray) -> None:
+def _gather(program: Program, sources: _Array, target: _Array) -> None:
     """Take down copies of the elements at ``sources`` [bytes] to ``target``, (n,)."""
     first = 0
     while first < len(sources):
@@ -101,12 +115,11 @@ def _gather(program: Program, sources: np.ndarray, target: np.ndarray) -> None:
 def _reduced(
     program: Program,
     ufunc: np.ufunc,
-    array: np.ndarray,
+    array: _Array,
     axis: int | tuple[int, ...] | None = None,
     *,
     keepdims: bool = False,
-) -> np.ndarray:
-    array = array if ufunc in (np.logical_or, np.logical_and) else ufuncs.as_float(program, array)
+) -> _Array:
     return ufuncs.reduce(program, ufunc, array, axis, keepdims=keepdims)
 
 
@@ -123,13 +136,16 @@ def _clipped(program: Program, array: Any, low: Any = None, high: Any = None) ->
 
 def _norm(
     program: Program,
-    array: np.ndarray,
+    array: _Array,
     order: None = None,
     axis: int | None = None,
     keepdims: bool = False,
 ) -> Any:
-    if order is not None or axis is None:
+    if order is not None or (axis is None and array.ndim != 1):
         raise Untraceable("np.linalg.norm with an order, or without an axis")
+    array = ufuncs.as_float(program, array)
+    if axis is None and not keepdims:
+        return _call(program, np.sqrt, _call(program, np.matmul, array, array))
     squares = _call(program, np.multiply, array, array)
     return _call(program, np.sqrt, ufuncs.reduce(program, np.add, squares, axis, keepdims=keepdims))
 
@@ -155,7 +171,8 @@ def _cross(program: Program, a: Any, b: Any) -> Any:
     return move(program, lambda arrays: np.stack(arrays, axis=-1), whole)
 
 
-def _mean(program: Program, array: np.ndarray, axis: Any = None, *, keepdims: bool = False) -> Any:
+def _mean(program: Program, array: _Array, axis: Any = None, *, keepdims: bool = False) -> Any:
+    array = ufuncs.as_float(program, array)
     total = _reduced(program, np.add, array, axis, keepdims=keepdims)
     return _call(program, np.true_divide, total, array.size / max(total.size, 1))
 
@@ -168,25 +185,30 @@ def _sinc(program: Program, array: Any) -> Any:
     return _call(program, np.true_divide, _call(program, np.sin, y), y)
 
 
-def _where(program: Program, condition: Any, *choices: Any) -> np.ndarray:
+def _where(program: Program, condition: Any, *choices: Any) -> _Array:
     if len(choices) != 2:
         raise Untraceable("np.where with a condition alone")
     return ufuncs.select(program, np.asarray(condition), *choices)
 
 
-def _full_like(program: Program, array: Any, value: Any, dtype: Any = None) -> np.ndarray:
-    if dtype not in (None, float):
-        raise Untraceable(f"an array like another, of {dtype}")
-    target = program.copied(np.full_like(array, value, dtype=float))
-    source = ufuncs.in_memory(program, value, _FLOAT)
+def _full_like(program: Program, array: Any, value: Any, dtype: Any = None) -> _Array:
+    target = program.result(np.full_like(array, value, dtype=dtype))
+    source = ufuncs.in_memory(program, value, target.dtype)
     program.copy(np.broadcast_to(source, target.shape), target)  # in each run: it may be written to
     return target
 
 
-def _refuse_measured(program: Program, function: Any, *options: Any) -> None:
-    """Refuse options that are measured: which elements are moved would be frozen."""
-    if any(isinstance(each, np.ndarray) and program.holds(each) for each in options):
-        raise Untraceable(f"np.{function.__name__} with a measured option")
+def _refuse_arrays(
+    program: Program, name: str, others: Sequence[Any], options: dict[str, Any]
+) -> None:
+    """Refuse a measured option, which would be frozen, and results of other kinds or elsewhere."""
+    arrays = [e for e in (*others, *options.values()) if isinstance(e, np.ndarray)]
+    if any(program.holds(each) or each.dtype.kind not in "iub" for each in arrays):
+        raise Untraceable(f"{name} with a measured option")
+    if {"out", "dtype", "casting"} & options.keys() or (
+        name in ("np.atleast_1d", "np.atleast_2d") and others
+    ):
+        raise Untraceable(f"{name} with such options")
 
 
 def _shape_of(value: Any) -> Any:

@@ -55,5 +55,7 @@ def inner_loop(ufunc: np.ufunc, types: tuple[np.dtype[Any], ...]) -> InnerLoop:
     for index in range(ufunc.ntypes):
         first = index * ufunc.nargs
         if [head.types[first + k][0] for k in range(ufunc.nargs)] == numbers:
-            return InnerLoop(head.functions[index] or 0, (head.data and head.data[index]) or 0)
+            data = head.data[index] if head.data else None
+            if head.functions[index]:
+                return InnerLoop(head.functions[index], data or 0)
     raise Untraceable(f"np.{ufunc.__name__} has no loop over {', '.join(map(str, types))}")

@@ -7,16 +7,17 @@ wherever it lies, is another instance of the program: each thread has its own.
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from math import prod
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mjspace.tracing.inner_loops import Untraceable, inner_loop
 
 MEMORY = 1 << 20
 """Size of a program's memory while it is taken down [bytes]."""
 _BOOL, _FLOAT = np.dtype(bool), np.dtype(float)
+_Array = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,11 @@ class Calls:
     dimensions and its steps begin). ``words`` that ``relative`` marks are offsets in the memory.
     """
 
-    table: np.ndarray
+    table: _Array
     """(calls, 5), int64."""
-    words: np.ndarray
+    words: _Array
     """(n,), int64."""
-    relative: np.ndarray
+    relative: _Array
     """(n,), int64: 1 or 0."""
 
 
@@ -53,68 +54,102 @@ class Program:
         self._memory = np.zeros(MEMORY // 8).view(np.uint8)
         self._used = 0
         self._section: _Section | None = None
+        self._failure: Exception | None = None
+        self._ufuncs: set[np.ufunc] = set()  # kept alive: their loops are called by address
 
     @contextmanager
     def section(self) -> Iterator[list[Calls]]:
-        """Take down calls until the end of the context; the list then holds them."""
+        """Take down calls until the end of the context; the list then holds them.
+
+        Raises:
+            Untraceable: something could not be taken down, even if the code caught that.
+        """
         taken: list[Calls] = []
         self._section = _Section()
         try:
             yield taken
+            if self._failure is not None:
+                raise Untraceable(str(self._failure)) from self._failure
             taken.append(self._section.finished())
         finally:
             self._section = None
 
     @property
-    def memory(self) -> np.ndarray:
+    def memory(self) -> _Array:
         """Return the memory in use, (bytes,) of uint8: a view."""
         return self._memory[: self._used]
 
-    def place(self, shape: tuple[int, ...], kind: np.dtype[Any] = _FLOAT) -> np.ndarray:
-        """Return an array of zeros in the memory, float64 or bool.
+    def failed(self, error: Exception) -> None:
+        """Let the section end with the ``error``, whatever the code makes of it."""
+        self._failure = self._failure or error
+
+    def refuse(self, reason: str) -> NoReturn:
+        """Raise ``Untraceable``; the section ends with it, even if the code catches it."""
+        error = Untraceable(reason)
+        self.failed(error)
+        raise error
+
+    def copied(self, values: Any) -> _Array:
+        """Return a copy of ``values`` in the memory, contiguous, float64 or bool.
 
         Raises:
-            Untraceable: of another kind, or the memory is full.
+            Untraceable: they are of a kind that float64 cannot hold, or the memory is full.
         """
+        return self._placed(np.array(values, order="C"))
+
+    def result(self, values: Any) -> _Array:
+        """Return a copy of what NumPy computed, laid out as that is; of a number, read-only.
+
+        Raises:
+            Untraceable: it is neither of float64 nor of bool, or the memory is full.
+        """
+        kind = np.asarray(values).dtype
         if kind not in (_BOOL, _FLOAT):
-            raise Untraceable(f"an array of {kind}")
-        size = prod(shape) * kind.itemsize
-        if self._used + size > MEMORY:
+            raise Untraceable(f"a result of {kind}")
+        array = self._placed(np.array(values, order="K"))
+        array.setflags(write=isinstance(values, np.ndarray))
+        return array
+
+    def _placed(self, laid_out: _Array) -> _Array:
+        if not np.can_cast(laid_out.dtype, _FLOAT):
+            raise Untraceable(f"an array of {laid_out.dtype}")
+        if laid_out.dtype != _BOOL:
+            laid_out = laid_out.astype(_FLOAT)
+        if self._used + laid_out.nbytes > MEMORY:
             raise Untraceable(f"more than {MEMORY} bytes of arrays")
-        array: np.ndarray = self._memory[self._used : self._used + size].view(kind).reshape(shape)
-        self._used += -(-size // 8) * 8
+        array = self.at(self._used, laid_out.shape, laid_out.strides, laid_out.dtype)
+        array[...] = laid_out
+        self._used += -(-laid_out.nbytes // 8) * 8
         return array
 
-    def copied(self, values: Any) -> np.ndarray:
-        """Return a copy of ``values`` in the memory."""
-        values = np.asarray(values)
-        array = self.place(values.shape, _BOOL if values.dtype == _BOOL else _FLOAT)
-        array[...] = values
-        return array
-
-    def holds(self, array: np.ndarray) -> bool:
+    def holds(self, array: _Array) -> bool:
         """Return whether the ``array`` is a view of the memory."""
         return 0 <= self._offset(array) < MEMORY
 
-    def offset(self, array: np.ndarray) -> int:
-        """Return where an ``array`` of the memory begins [bytes]."""
-        assert self.holds(array)
+    def offset(self, array: _Array) -> int:
+        """Return where an ``array`` of the memory begins [bytes].
+
+        Raises:
+            Untraceable: it is another array.
+        """
+        if not self.holds(array):
+            raise Untraceable("a NumPy array that measured values are written to")
         return self._offset(array)
 
     def at(
         self, offset: int, shape: tuple[int, ...], strides: tuple[int, ...], kind: np.dtype[Any]
-    ) -> np.ndarray:
+    ) -> _Array:
         """Return the array of that ``kind`` that begins at ``offset``, with ``strides`` [bytes]."""
         return np.ndarray(shape, kind, self._memory, offset, strides)
 
-    def apply(self, ufunc: np.ufunc, operands: Sequence[np.ndarray]) -> None:
+    def apply(self, ufunc: np.ufunc, operands: Sequence[_Array]) -> None:
         """Take down a call on arrays of the memory, broadcast to the shape of the last."""
         shape = operands[-1].shape
         views = [np.broadcast_to(each, shape) for each in operands]
         for lead, (length, *steps) in _runs(views):
             self._call(ufunc, lead, (length,), steps)
 
-    def apply_core(self, ufunc: np.ufunc, signature: str, operands: Sequence[np.ndarray]) -> None:
+    def apply_core(self, ufunc: np.ufunc, signature: str, operands: Sequence[_Array]) -> None:
         """Take down a call of a generalized ufunc, whose ``signature`` names its core dimensions.
 
         The last operand has all of the outer dimensions.
@@ -137,13 +172,13 @@ class Program:
             steps = [0] * len(views) + [step for view in views for step in view.strides]
             self._call(ufunc, views, (1, *sizes.values()), steps)
 
-    def reduce(self, ufunc: np.ufunc, source: np.ndarray, target: np.ndarray) -> None:
+    def reduce(self, ufunc: np.ufunc, source: _Array, target: _Array) -> None:
         """Take down the reduction of the last axis of ``source`` into ``target``, (...)."""
         for index in np.ndindex(*target.shape):
             result, row = target[(*index, ...)], source[(*index, ...)]
             self._call(ufunc, [result, row, result], (len(row),), [0, *row.strides, 0])
 
-    def copy(self, source: np.ndarray, target: np.ndarray) -> None:
+    def copy(self, source: _Array, target: _Array) -> None:
         """Take down a copy between arrays of the memory of the same kind."""
         if target.dtype == _BOOL:
             self.apply(np.logical_or, [source, source, target])
@@ -153,13 +188,14 @@ class Program:
     def _call(
         self,
         ufunc: np.ufunc,
-        operands: Sequence[np.ndarray],
+        operands: Sequence[_Array],
         dimensions: Sequence[int],
         steps: Sequence[int],
     ) -> None:
         if self._section is None:
             raise Untraceable("an array kept from an earlier call")
         loop = inner_loop(ufunc, tuple(each.dtype for each in operands))
+        self._ufuncs.add(ufunc)
         section = self._section
         first = len(section.words)
         section.words += [*map(self.offset, operands), *dimensions, *steps]
@@ -167,11 +203,11 @@ class Program:
         at = first + len(operands)
         section.calls.append((loop.address, loop.data, first, at, at + len(dimensions)))
 
-    def _offset(self, array: np.ndarray) -> int:
+    def _offset(self, array: _Array) -> int:
         return int(array.ctypes.data) - int(self._memory.ctypes.data)
 
 
-def _runs(views: Sequence[np.ndarray]) -> Iterator[tuple[list[np.ndarray], tuple[int, ...]]]:
+def _runs(views: Sequence[_Array]) -> Iterator[tuple[list[_Array], tuple[int, ...]]]:
     """Yield (arrays of the first elements, (length, step of each)) of as long runs as there are.
 
     ``views`` have one shape. Axes along which every view goes on with one step are one run.

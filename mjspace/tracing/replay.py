@@ -6,6 +6,7 @@ import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.tracing.program import Calls
@@ -66,7 +67,7 @@ def run(table: Any, words: Any) -> None:
         )
 
 
-def prove(calls: Calls, memory: np.ndarray) -> None:
+def prove(calls: Calls, memory: NDArray[Any]) -> None:
     """Run the ``calls`` on a copy of the ``memory`` in which they were taken down.
 
     Raises:

@@ -1,14 +1,17 @@
 """Ufuncs on arrays of a program's memory: computed at once by NumPy, and taken down."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mjspace.gufunc import gufunc
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.tracing.program import Program
 
-Result = np.ndarray | tuple[np.ndarray, ...]
+_Array = NDArray[Any]
+Result = _Array | tuple[_Array, ...]
 _BOOL, _FLOAT = np.dtype(bool), np.dtype(float)
 _MATMUL = "(n,k),(k,m)->(n,m)"
 
@@ -17,6 +20,12 @@ _MATMUL = "(n,k),(k,m)->(n,m)"
 def _select(condition: Any, yes: Any, no: Any, result: Any) -> None:
     for i in range(condition.size):
         result[i] = yes[i] if condition[i] else no[i]
+
+
+@gufunc(["void(f8, f8, f8[:])"], "(),()->()")
+def power_of_numbers(base: Any, exponent: Any, result: Any) -> None:
+    """Compute ``base ** exponent`` as Python and NumPy's scalars do: by C's ``pow``."""
+    result[0] = base**exponent
 
 
 def apply(
@@ -39,7 +48,7 @@ def apply(
     operands = _operands(program, ufunc, inputs)
     computed = ufunc(*operands)
     results = computed if isinstance(computed, tuple) else (computed,)
-    targets = tuple(program.copied(result) for result in results)
+    targets = tuple(program.result(each) for each in results)
     if ufunc is np.matmul:
         _matmul(program, operands, targets[0])
     elif ufunc.signature:
@@ -47,8 +56,8 @@ def apply(
     else:
         program.apply(ufunc, [*operands, *targets])
     for output, target in zip(outputs or (), targets, strict=False):
-        output[...] = target
         program.copy(target, output)
+        output[...] = target
     if outputs is not None:
         targets = outputs
     return targets if len(targets) > 1 else targets[0]
@@ -57,32 +66,28 @@ def apply(
 def reduce(
     program: Program,
     ufunc: np.ufunc,
-    array: np.ndarray,
+    array: _Array,
     axis: int | tuple[int, ...] | None = 0,
-    dtype: None = None,
-    out: None = None,
+    *,
     keepdims: bool = False,
-) -> np.ndarray:
+) -> _Array:
     """Return the reduction of an ``array`` of the memory along the ``axis``.
 
+    NumPy calls the loop along the axis whose elements lie closest, whichever that is, and where it
+    is reduced, the loop may add up pairwise.
+
     Raises:
-        Untraceable: the ufunc has no loop over the array's type.
+        Untraceable: it has no loop over the array's type, or NumPy's order is not known.
     """
-    given = range(array.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
-    axes = sorted(each % array.ndim for each in given)
+    named = range(array.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
+    axes = sorted(each % array.ndim for each in named)
     if ufunc in (np.logical_or, np.logical_and) and array.dtype != _BOOL:
         array = apply(program, np.not_equal, "__call__", (array, 0.0), {})  # type: ignore[assignment]
-    target = program.copied(ufunc.reduce(array, axis=tuple(axes), keepdims=keepdims))
-    lead = array.shape[: axes[0]]
-    if axes == list(range(axes[0], array.ndim)) and (len(axes) == 1 or array.flags.c_contiguous):
-        rows, along_rows = array.reshape(*lead, -1), True
-    elif len(axes) == 1:
-        rows, along_rows = np.moveaxis(array, axes[0], -1), False
-    else:
-        raise Untraceable(f"np.{ufunc.__name__}.reduce along the axes {axes}")
-    result = target.reshape(rows.shape[:-1])
+    target = program.result(ufunc.reduce(array, axis=tuple(axes), keepdims=keepdims))
+    result = target.squeeze(axis=tuple(axes)) if keepdims else target
+    rows, along_rows = _rows(ufunc, array, axes)
     if ufunc.identity is None:
-        program.copy(rows[..., :1].reshape(result.shape), result)
+        program.copy(rows[..., 0], result)
         rows = rows[..., 1:]
     else:
         start = np.full(result.shape, ufunc.identity, result.dtype)
@@ -95,16 +100,33 @@ def reduce(
     return target
 
 
-def select(program: Program, condition: Any, yes: Any, no: Any) -> np.ndarray:
-    """Return ``np.where(condition, yes, no)`` as floats in the memory."""
+def _rows(ufunc: np.ufunc, array: _Array, axes: list[int]) -> tuple[_Array, bool]:
+    """Return the array with the reduced elements along a last axis, and whether a loop has them."""
+    others = [axis for axis in range(array.ndim) if axis not in axes]
+    if 0 in array.shape:
+        return array.transpose(*others, *axes).reshape(*[array.shape[i] for i in others], 0), True
+    moved = array.transpose(*others, *axes)
+    steps = {axis: abs(array.strides[axis]) for axis in range(array.ndim) if array.shape[axis] > 1}
+    reduced = [axis for axis in steps if axis in axes]
+    along_rows = not reduced or min(steps[i] for i in reduced) == min(steps.values())
+    one_run = all(
+        array.strides[i] == array.strides[j] * array.shape[j] for i, j in pairwise(reduced)
+    )
+    if (len(reduced) > 1 and not (one_run and along_rows)) or 0 in steps.values():
+        raise Untraceable(f"np.{ufunc.__name__}.reduce along {axes} of {array.strides}")
+    lead = moved.shape[: len(others)]
+    return moved.reshape(*lead, -1), along_rows
+
+
+def select(program: Program, condition: Any, yes: Any, no: Any) -> _Array:
+    """Return ``np.where(condition, yes, no)`` of floats in the memory."""
     computed = np.where(condition, yes, no)
-    if computed.dtype == _BOOL:
-        raise Untraceable("np.where of booleans")
-    target = program.copied(computed)
-    chosen = condition if condition.dtype == _BOOL else condition != 0.0
+    if computed.dtype != _FLOAT:
+        raise Untraceable(f"np.where of {computed.dtype}")
+    target = program.result(computed)
     if program.holds(condition) and condition.dtype != _BOOL:
         raise Untraceable("np.where on numbers")
-    operands = [in_memory(program, chosen, _BOOL)]
+    operands = [in_memory(program, condition, _BOOL)]
     operands += [in_memory(program, each, _FLOAT) for each in (yes, no)]
     shape = computed.shape or (1,)
     views = [np.broadcast_to(each, shape) for each in operands]
@@ -112,16 +134,20 @@ def select(program: Program, condition: Any, yes: Any, no: Any) -> np.ndarray:
     return target
 
 
-def as_float(program: Program, array: np.ndarray) -> np.ndarray:
+def as_float(program: Program, array: _Array) -> _Array:
     """Return an array of the memory as float64."""
     return array if array.dtype == _FLOAT else select(program, array, 1.0, 0.0)
 
 
-def in_memory(program: Program, value: Any, kind: np.dtype[Any]) -> np.ndarray:
-    """Return the ``value`` as array of the memory and of that ``kind``, a constant copied to it."""
+def in_memory(program: Program, value: Any, kind: np.dtype[Any]) -> _Array:
+    """Return the ``value`` as array of the memory and of that ``kind``, a constant copied to it.
+
+    Raises:
+        Untraceable: a constant that float64 cannot hold, or numbers of the memory as booleans.
+    """
     array = np.asarray(value)
     if not program.holds(array):
-        return program.copied(array.astype(kind))
+        return program.copied(array.astype(bool) if kind == _BOOL else array)
     if array.dtype == kind:
         return array
     if kind == _FLOAT:
@@ -129,10 +155,8 @@ def in_memory(program: Program, value: Any, kind: np.dtype[Any]) -> np.ndarray:
     raise Untraceable("numbers as booleans")
 
 
-def _operands(program: Program, ufunc: np.ufunc, inputs: tuple[Any, ...]) -> list[np.ndarray]:
+def _operands(program: Program, ufunc: np.ufunc, inputs: tuple[Any, ...]) -> list[_Array]:
     """Return the ``inputs`` in the memory, of the types that the ufunc's loop takes."""
-    if ufunc.signature:
-        return [in_memory(program, each, _FLOAT) for each in inputs]
     kinds: list[Any] = [type(v) if type(v) in (int, float) else np.asarray(v).dtype for v in inputs]
     resolved = ufunc.resolve_dtypes((*kinds, *[None] * ufunc.nout))
     for kind in resolved:
@@ -141,11 +165,11 @@ def _operands(program: Program, ufunc: np.ufunc, inputs: tuple[Any, ...]) -> lis
     return [in_memory(program, v, kind) for v, kind in zip(inputs, resolved, strict=False)]
 
 
-def _matmul(program: Program, operands: list[np.ndarray], target: np.ndarray) -> None:
+def _matmul(program: Program, operands: list[_Array], target: _Array) -> None:
     """Take down a product of matrices, with vectors as matrices of one row or column."""
     left, right = operands
-    if left.ndim == 1:
-        left, target = left[None], target[..., None, :]
     if right.ndim == 1:
         right, target = right[:, None], target[..., None]
+    if left.ndim == 1:
+        left, target = left[None], target[..., None, :]
     program.apply_core(np.matmul, _MATMUL, [left, right, target])
