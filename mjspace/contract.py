@@ -260,6 +260,10 @@ class Law(Protocol):
     ``GimbalRateCommand``; an engine on gimbals a ``ThrustCommand``, on/off thrusters a
     ``PulseCommand``. ``reference`` is a row of the scenario's reference: ``DesiredMotion``.
 
+    Laws are flown compiled where that is possible: ``step`` is called once on arrays that note what
+    is computed with them, and for the first period of every block. One that has to be called in
+    each period, since it prints or counts, says ``compiled = False``.
+
     A batched law may have an inner loop as well, for what must be quick: a method
     ``inner(state, time, command, measurement) -> (state, command)``, pure like ``step``, that is
     called every integration step and turns the command of ``step`` into that of the motors.

@@ -99,6 +99,15 @@ class ActuatorSet:
             saturated.append(cut)
         return state, tuple(applied), np.concatenate(saturated, axis=-1)
 
+    def check(self, command: Any, vehicles: int) -> None:
+        """Refuse a ``command`` that they cannot obey.
+
+        Raises:
+            FlightError: a field that a kind takes is missing or misshapen.
+        """
+        for takes, _ in self._declared:
+            _check(command, takes, vehicles)
+
     def measured(self, state: State, truth: Measurement) -> Measurement:
         """Return the truth with what the actuators' own sensors measure."""
         for kind in self.kinds:

@@ -1,7 +1,8 @@
 """A vehicle's sensors: the truth, sampled late, with errors, and held in between."""
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any
 
@@ -85,19 +86,56 @@ class SensorSuite:
         ``truth`` has a vehicle axis and each quantity by its name: attitude (N, 4), rate (N, 3).
         ``state`` is left as it is, so that this step may be sampled from it again.
         """
-        arrays = truth._asdict()
-        if arrays.keys() == self._as_it_is:
-            return state, truth
-        reports = {name: arrays[quantity] for name, quantity in self._ideal.items()}
         if self._sampled:
             state = state.copy()
             for sensor in self._sampled:
                 if step_index % sensor.period == 0:
                     self._take(sensor, state, step_index, truth)
-                reports[sensor.name] = state[sensor.samples_field][:, 0]
+        return state, self.report(state, truth)
+
+    def report(self, state: State, truth: Measurement) -> Measurement:
+        """Return the measurement between two samples: what the sensors report is held."""
+        arrays = truth._asdict()
+        if arrays.keys() == self._as_it_is:
+            return truth
+        reports = {name: arrays[quantity] for name, quantity in self._ideal.items()}
+        for sensor in self._sampled:
+            reports[sensor.name] = state[sensor.samples_field][:, 0]
         for name in self._reported:
             reports[name] = arrays[name]
-        return state, self.measurement(**reports)
+        return self.measurement(**reports)
+
+    @property
+    def biases(self) -> dict[str, Array]:
+        """The constant bias of each sensor that is not ideal, (N, axes)."""
+        return {sensor.name: sensor.bias for sensor in self._sampled}
+
+    def draws(self, samples: Sequence[int]) -> dict[str, Array]:
+        """Return the random numbers of these ``samples``, (n, N, axes), by sensor and purpose."""
+        drawn = {}
+        for sensor in self._sampled:
+            if sensor.table.noise_std:
+                drawn[f"{sensor.name}_white"] = np.array([sensor.white(i) for i in samples])
+            if sensor.table.bias_walk:
+                drawn[f"{sensor.name}_increment"] = np.array([sensor.increment(i) for i in samples])
+        return drawn
+
+    def with_errors(self, biases: Mapping[str, Any], draws: Mapping[str, Any]) -> "SensorSuite":
+        """Return sensors with these biases, and these random numbers in whichever sample.
+
+        Both are as ``biases`` and, of one sample, as ``draws`` return them; or they are traced.
+        """
+        other = copy.copy(self)
+        other._sampled = [
+            replace(
+                sensor,
+                bias=biases[sensor.name],
+                white=lambda _, name=sensor.name: draws[f"{name}_white"],
+                increment=lambda _, name=sensor.name: draws[f"{name}_increment"],
+            )
+            for sensor in self._sampled
+        ]
+        return other
 
     def _take(self, sensor: "_Sampled", state: State, step_index: int, truth: Measurement) -> None:
         """Put the sample of this step, and the walk that follows it, into ``state``."""

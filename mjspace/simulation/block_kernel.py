@@ -34,7 +34,7 @@ ORDERS = np.dtype([
     # of a control instant and of the actuators
     ("memory", *_TABLE), ("words", *_TABLE), ("relative", *_TABLE),
     ("sensing", *_TABLE), ("driving", *_TABLE),
-    # into the memory at a control instant: (to, address, stride of periods, size)
+    # into the memory at a control instant: (to, address, strides of periods and vehicles, size)
     ("inputs", *_TABLE),
     # what a vehicle remembers from block to block: (in the memory, in the vehicle's row, size)
     ("remembered", *_TABLE), ("row", _NUMBER), ("row_stride", _NUMBER),
@@ -122,7 +122,7 @@ def _fly(
     """Fly a block on a ``memory`` and the ``words`` placed there, which the caller keeps alive."""
     base = address_of(memory)
     sensing, driving = _table(orders.sensing, 5), _table(orders.driving, 5)
-    inputs, remembered = _table(orders.inputs, 4), _table(orders.remembered, 3)
+    inputs, remembered = _table(orders.inputs, 5), _table(orders.remembered, 3)
     after_sensing, after_driving = _table(orders.after_sensing, 3), _table(orders.after_driving, 3)
     before, after = _table(orders.before, 3), _table(orders.after, 3)
     applied = _table(orders.applied, 4)
@@ -140,7 +140,8 @@ def _fly(
         time[0] = number * orders.control
         _get_state(orders.get_state, model, data, base + orders.state_row, orders.state)
         for i in range(len(inputs)):
-            copy_bytes(base + inputs[i, 0], inputs[i, 1] + k * inputs[i, 2], inputs[i, 3])
+            source = inputs[i, 1] + k * inputs[i, 2] + vehicle * inputs[i, 3]
+            copy_bytes(base + inputs[i, 0], source, inputs[i, 4])
         run(sensing, words)
         _copy(record, base, before)
         _copy(base, base, after_sensing)

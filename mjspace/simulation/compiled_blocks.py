@@ -2,7 +2,7 @@
 
 import time as clock
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,9 +32,16 @@ class CompiledBlocks:
     """
 
     def __init__(
-        self, assembly: Assembly, start: Start, stepper: Stepper, law: FlownLaw, threads: int
+        self,
+        assembly: Assembly,
+        start: Start,
+        members: Sequence[int],
+        stepper: Stepper,
+        law: FlownLaw,
+        threads: int,
     ) -> None:
-        self._assembly, self._start, self._threads = assembly, start, threads
+        self._assembly, self._start = assembly, start
+        self._members, self._threads = members, threads
         self._stepper, self._law = stepper, law
         self._period: CompiledPeriod
         self._flight: CompiledFlight | None = None
@@ -59,29 +66,36 @@ class CompiledBlocks:
         last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> Columns:
-        """Return the columns of up to ``count`` periods, of which Python has flown the ``first``.
+    ) -> tuple[Columns, FlightError | None]:
+        """Return the columns of up to ``count`` periods, and what the law raised after them.
 
-        ``columns`` are that period's. Where the compiled block cannot be had, or differs from them
-        or in the state that they lead to, they are returned, and Python flies on.
+        Python has flown the ``first``, whose ``columns`` are given. Where the compiled block cannot
+        be had, or differs from them or in the state that they lead to, they are returned, and
+        Python flies on. ``stop`` is called in each period in which the law is called in Python.
         """
         began = clock.monotonic()
-        after = self._after_a_period()
+        after, trouble = self._after_a_period(), None
         try:
             flight = self._flight or self._compile(first, desired)
-            flight.set(first.physics, first.memory, first.law)
+            flight.set(first.physics, first.memory, first.sensors, first.law)
             flight.begin(first.number, count, last, desired)
             if self._period.has_law:
                 flight.fly(count)
                 compiled = flight.columns()
             else:
-                compiled = self._fly_law_in_python(flight, first, count, desired, stop)
-        except (Untraceable, SimulationError, FlightError) as error:
-            return self._off(str(error), columns, after)  # Python meets the same error, and reports
+                compiled, trouble = self._fly_law_in_python(flight, first, count, desired, stop)
+        except (Untraceable, SimulationError) as error:
+            self._off(str(error), after)  # MuJoCo raises the same in Python, which reports it
+            return columns, None
         if flight.warned:
-            return self._off("MuJoCo warned", columns, after)
+            self._off("MuJoCo warned", after)
+            return columns, None
         different = _difference(columns, compiled)
-        if not different and compiled.physics[1].tobytes() != after.physics.tobytes():
+        if (
+            not different
+            and len(compiled) > 1
+            and compiled.physics[1].tobytes() != after.physics.tobytes()
+        ):
             different = "the state after a period"
         if different:
             warnings.warn(
@@ -90,14 +104,17 @@ class CompiledBlocks:
                 RuntimeWarning,
                 stacklevel=2,
             )
-            return self._off(f"{different} differs from Python's", columns, after)
+            self._off(f"{different} differs from Python's", after)
+            return columns, None
         self._take(flight)
         if self._period.has_law:
+            stepper = self._stepper
+            stepper.sensors = {name: values.copy() for name, values in flight.sensors.items()}
             kind: Any = type(flight.law)
             kept = [values.copy() for values in flight.law]
             self._law.state = kind(*kept) if kept else ()
         self.seconds = (clock.monotonic() - began) / len(compiled)
-        return compiled
+        return compiled, trouble
 
     def _fly_law_in_python(
         self,
@@ -106,8 +123,12 @@ class CompiledBlocks:
         count: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> Columns:
-        """Fly the block with the law, and the sensors, called in each period."""
+    ) -> tuple[Columns, FlightError | None]:
+        """Fly the block with the law, and the sensors, called in each period.
+
+        Return its columns, and what the law raised after them.
+        """
+        trouble: FlightError | None = None
         recording = Recording(first, count, OF_THE_LAW)
         flight.fly(1, first.command)
         recording.write(first)
@@ -115,15 +136,20 @@ class CompiledBlocks:
         for number, row in enumerate(rows, first.number + 1):
             self._take(flight)
             period = self._stepper.sense(number)
-            period.law, period.command, period.signals = self._law.step(
-                period.time, period.measurement, type(desired)(*row)
-            )
+            try:
+                period.law, period.command, period.signals = self._law.step(
+                    period.time, period.measurement, type(desired)(*row)
+                )
+                self._stepper.check(period.command)
+            except FlightError as error:
+                trouble = stopped_at(period.time, error)
+                break
             flight.fly(1, period.command)
             recording.write(period)
             if stop():
                 break
         of_law, columns = recording.columns(), flight.columns()
-        return Columns(of_law.groups | columns.groups, [], of_law.kinds)
+        return Columns(of_law.groups | columns.groups, [], of_law.kinds), trouble
 
     def _take(self, flight: CompiledFlight) -> None:
         """Put the stepper where the compiled flight is."""
@@ -144,7 +170,12 @@ class CompiledBlocks:
             self.reason = str(error)
             self._period = compile_period(*arguments, reference, law=False)
         self._flight = CompiledFlight(
-            self._assembly, self._stepper.layout, self._period, self._start, self._threads
+            self._assembly,
+            self._stepper.layout,
+            self._period,
+            self._start,
+            self._members,
+            self._threads,
         )
         return self._flight
 
@@ -152,13 +183,19 @@ class CompiledBlocks:
         stepper = self._stepper
         return _After(stepper.batch.state.copy(), stepper.memory, stepper.sensors, self._law.state)
 
-    def _off(self, reason: str, columns: Columns, after: "_After") -> Columns:
+    def _off(self, reason: str, after: "_After") -> None:
         """Let Python fly on from ``after`` the first period."""
         self.on, self.reason, self._flight = False, reason, None
         stepper = self._stepper
         stepper.batch.state[...] = after.physics
         stepper.memory, stepper.sensors, self._law.state = after[1:]
-        return columns
+
+
+def stopped_at(time: float, error: Exception) -> FlightError:
+    """Return the error that ends a flight at that ``time`` [s]."""
+    trouble = FlightError(f"stopped at t = {time:.6g} s: {error}")
+    trouble.__cause__ = error.__cause__ or error
+    return trouble
 
 
 class _After(NamedTuple):

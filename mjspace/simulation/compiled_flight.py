@@ -25,6 +25,7 @@ class CompiledFlight:
     Attributes:
         physics: MuJoCo's integration state of each, (N, nstate).
         memory: what the actuators remember, by name, (N, ...).
+        sensors: what the sensors remember, likewise.
         law: the law's state, a named tuple of arrays (N, ...), or empty.
         command: the law's command, arrays (N, ...), where the period begins with it.
     """
@@ -35,21 +36,26 @@ class CompiledFlight:
         layout: StateLayout,
         period: CompiledPeriod,
         start: Start,
+        members: Sequence[int],
         threads: int,
     ) -> None:
         """Put them into a batch with the fields of MuJoCo's model of the ``start``."""
         self._assembly, self._layout, self._period = assembly, layout, period
         vehicles = len(start.physics)
         self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model)
-        self._suite = assembly.sensors([0])
+        self._suite = assembly.sensors(members)
         self.physics = self._batch.state
         made = () if period.has_law else period.command
-        remembered = [*period.memory.values(), *period.law, *made]
+        named = (period.memory, period.sensors, period.biases)
+        remembered = [*(a for arrays in named for a in arrays.values()), *period.law, *made]
         places, size = _packed(remembered)
         self._rows = np.zeros((vehicles, size), np.uint8)
         views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
-        self.memory = dict(zip(period.memory, views, strict=False))
-        views = views[len(period.memory) :]
+        each = iter(views)
+        self.memory, self.sensors, biases = ({name: next(each) for name in of} for of in named)
+        views = list(each)
+        for name, bias in self._suite.biases.items():
+            biases[name][...] = bias
         self.law = type(period.law)(*views[: len(period.law)]) if period.law else ()
         self.command = views[len(period.law) :]
         self._record_places, self._record_size = _packed(
@@ -59,12 +65,20 @@ class CompiledFlight:
         self._orders = self._constant_orders(remembered, places)
         self._function = block_function().address
 
-    def set(self, physics: Array, memory: dict[str, Array], law: Any) -> None:
+    def set(
+        self, physics: Array, memory: dict[str, Array], sensors: dict[str, Array], law: Any
+    ) -> None:
         """Put the vehicles there, with what is remembered."""
         self.physics[...] = physics
-        for name, values in memory.items():
-            self.memory[name][...] = values
-        for target, values in zip(self.law, law, strict=True):
+        for target, values in zip(
+            (*self.memory.values(), *self.sensors.values(), *self.law),
+            (
+                *(memory[name] for name in self.memory),
+                *(sensors[name] for name in self.sensors),
+                *law,
+            ),
+            strict=True,
+        ):
             target[...] = values
 
     def begin(self, first: int, count: int, last: int, desired: DesiredMotion) -> None:
@@ -89,9 +103,21 @@ class CompiledFlight:
         """
         orders = self._orders
         if self._period.has_law:
+            first = self._first + self._flown
+            draws = self._suite.draws(range(first, first + count))
+            desired = [rows[self._flown :, None] for rows in self._desired]
+            arrays = [*desired, *draws.values()]
             inputs = _table(
-                (self._offset(to), of[self._flown :].ctypes.data, of.strides[0], of.strides[0])
-                for to, of in zip(self._period.reference, self._desired, strict=True)
+                (
+                    self._offset(to),
+                    of.ctypes.data,
+                    of.strides[0],
+                    of.shape[1] > 1 and of.strides[1],
+                    to.nbytes,
+                )
+                for to, of in zip(
+                    (*self._period.reference, *self._period.draws.values()), arrays, strict=True
+                )
             )
             orders["inputs"] = inputs.ctypes.data, len(inputs)
         else:
@@ -120,11 +146,11 @@ class CompiledFlight:
                 groups.setdefault(each.group, {})[each.name] = kept
         if period.has_law:
             state, memory = groups["physics"][""], groups["memory"]
-            truth = truth_of(state, memory, self._layout, self._assembly.actuators, ())
-            _, measurement = self._suite.sample({}, 0, truth)
-            measured = {name: a for name, a in measurement._asdict().items() if a.size}
-            groups |= {"sensors": {}, "measurement": measured}
-            for name in ("law", "signals"):
+            if not self._suite.ticks:
+                truth = truth_of(state, memory, self._layout, self._assembly.actuators, ())
+                reports = self._suite.report({}, truth)._asdict()
+                groups["measurement"] = {name: a for name, a in reports.items() if a.size}
+            for name in ("law", "signals", "sensors"):
                 groups.setdefault(name, {})
         return Columns(groups, [], period.kinds)
 

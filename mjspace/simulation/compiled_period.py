@@ -15,7 +15,7 @@ from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
-from mjspace.simulation.hidden_memory import copied, refuse_hidden_memory
+from mjspace.simulation.hidden_memory import refusing_hidden_memory
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
@@ -57,6 +57,12 @@ class CompiledPeriod:
     """What the actuators remember, (1, ...)."""
     law: Any
     """The law's state, a named tuple of arrays (1, ...), or empty."""
+    sensors: dict[str, np.ndarray]
+    """What the sensors remember, (1, ...)."""
+    biases: dict[str, np.ndarray]
+    """The constant bias of each sensor that is not ideal, (1, axes)."""
+    draws: dict[str, np.ndarray]
+    """Random numbers of a sample, (1, axes), as ``SensorSuite.draws`` names them."""
     command: Any
     """The law's command, a named tuple of arrays (1, ...)."""
     has_law: bool
@@ -93,7 +99,10 @@ def compile_period(
     try:
         with np.errstate(all="ignore"):
             tracing = _Tracing(assembly, layout, example, reference)
-            return tracing.with_law() if law else tracing.of_command(example.command)
+            if not law:
+                return tracing.of_command(example.command)
+            with refusing_hidden_memory(tracing.law) as tracing.law:
+                return tracing.with_law()
     except FlightError as error:
         # Says which actuator, and where.
         raise Untraceable(str(error)) from error
@@ -119,9 +128,16 @@ class _Tracing:
         self.law_state = _tuple_like(example.law, map(self._held, example.law))
         self.inputs = [self.time, self.physics, *self.memory.values(), *self.law_state]
         self.inputs += self.reference
-        self.suite = assembly.sensors([0])
+        self.sensors = {name: self._held(array) for name, array in example.sensors.items()}
+        suite = assembly.sensors([0])
+        self.biases = {name: self._held(array) for name, array in suite.biases.items()}
+        self.draws = {name: self._held(array[0]) for name, array in suite.draws([1]).items()}
+        self.inputs += [*self.sensors.values(), *self.biases.values(), *self.draws.values()]
+        self.suite = suite.with_errors(
+            self._all_traced_of(self.biases), self._all_traced_of(self.draws)
+        )
         law = assembly.law
-        self.written_law: Any = law.law if isinstance(law, UnbatchedLaw) else law
+        self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
 
     def with_law(self) -> CompiledPeriod:
         """Return the program of sensors, law and actuators.
@@ -129,19 +145,27 @@ class _Tracing:
         Raises:
             Untraceable: as ``compile_period``; or the sensors err.
         """
-        self.law = copied(self.written_law)
-        if self.suite.ticks:
-            raise Untraceable("sensors err, or sample at times of their own")
+        steps = self.assembly.scenario.rates.steps
+        if self.suite.ticks - {steps}:
+            raise Untraceable("sensors sample at other times than the control instants")
+        before = tuple(self.sensors.values())
         with self.program.section() as sensing:
-            measurement = self._measured(self._truth())
+            # Not of sample 0, which integrating sensors begin with.
+            sampled, measurement = self.suite.sample(
+                self._all_traced_of(self.sensors), steps, self._truth()
+            )
+            after = self._next(before, tuple(sampled[name] for name in self.sensors))
+            reports = self._reports(measurement)
             state, command, signals = self._law_step(measurement)
             state = self._next(self.law_state, state)
             command, signals = self._numbers(command), self._numbers(signals)
         prove(sensing[0], self.program.memory)
-        changes = _changes(self.law_state, state)
+        changes = _changes(self.law_state, state) + _changes(before, after)
         for target, source in changes:
             target[...] = source
         recorded = [*_recorded("law", self.law_state), *_recorded("signals", signals)]
+        recorded += [Recorded("sensors", name, array) for name, array in self.sensors.items()]
+        recorded += reports
         return self._compiled(
             command,
             sensing=sensing[0],
@@ -185,10 +209,11 @@ class _Tracing:
         with self.program.section() as driving:
             truth, motors, inner = self._truth(), self._all_traced(command), self.law_state
             if self.assembly.inner:
-                inner, motors = self._law_inner(motors, self._measured(truth))
+                held = self.suite.report(self._all_traced_of(self.sensors), truth)
+                inner, motors = self._law_inner(motors, held)
                 inner = self._next(self.law_state, inner)
             memory, applied, saturated = self.assembly.actuators.act(
-                self._all_traced_memory(), motors, truth, self.assembly.hold
+                self._all_traced_of(self.memory), motors, truth, self.assembly.hold
             )
             outputs = self._numbers(applied)
             (cut,) = self._numbers((saturated,))
@@ -209,6 +234,9 @@ class _Tracing:
             reference=self.reference,
             memory=self.memory,
             law=self.law_state,
+            sensors=self.sensors,
+            biases=self.biases,
+            draws=self.draws,
             command=command,
             has_law="law" in kinds,
             after_sensing=after_sensing,
@@ -223,12 +251,21 @@ class _Tracing:
     def _truth(self) -> Any:
         physics: Any = self._traced(self.physics)
         return truth_of(
-            physics, self._all_traced_memory(), self.layout, self.assembly.actuators, ()
+            physics, self._all_traced_of(self.memory), self.layout, self.assembly.actuators, ()
         )
 
-    def _measured(self, truth: Any) -> Any:
-        _, measurement = self.suite.sample({}, 0, truth)
-        return measurement
+    def _reports(self, measurement: Any) -> list[Recorded]:
+        """Return what is recorded of the ``measurement``; nothing where it follows from the truth.
+
+        Of ideal sensors a block computes it for all of its periods at once.
+        """
+        if not self.suite.ticks:
+            return []
+        values = {name: value for name, value in measurement._asdict().items() if value.size}
+        arrays = self._numbers(tuple(values.values()))
+        return [
+            Recorded("measurement", name, array) for name, array in zip(values, arrays, strict=True)
+        ]
 
     def _law_step(self, measurement: Any) -> tuple[Any, Any, Any]:
         unbatched = isinstance(self.assembly.law, UnbatchedLaw)
@@ -236,14 +273,12 @@ class _Tracing:
         state, reference = self._all_traced(self.law_state), self._all_traced(self.reference)
         with _of_the_law():
             after, command, signals = step(state, self._traced(self.time), measurement, reference)
-        refuse_hidden_memory(self.law, self.written_law)
         return after or (), command, signals or ()
 
     def _law_inner(self, command: Any, measurement: Any) -> tuple[Any, Any]:
         state = self._all_traced(self.law_state)
         with _of_the_law():
             after, motors = self.law.inner(state, self._traced(self.time), command, measurement)
-        refuse_hidden_memory(self.law, self.written_law)
         return after or (), motors
 
     def _held(self, array: Any) -> np.ndarray:
@@ -263,6 +298,9 @@ class _Tracing:
 
     def _all_traced_memory(self) -> dict[str, Any]:
         return {name: self._traced(array) for name, array in self.memory.items()}
+
+    def _all_traced_of(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+        return {name: self._traced(array) for name, array in arrays.items()}
 
     def _next(self, before: Any, after: Any) -> Any:
         """Return the state that follows ``before``, in contiguous arrays that no input shares.

@@ -6,43 +6,65 @@ what it receives. Compiled, it would be called once in a block.
 
 import copy
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
+
+import numpy as np
 
 from mjspace.tracing.inner_loops import Untraceable
 
-_PLAIN = (int, float, str, bool, type(None))
+_VALUES = (bool, int, float, complex, str, bytes, type(None))
+_COLLECTIONS = (list, tuple, set, deque)
+_DEPTH = 6  # of attributes within attributes
 
 
-def copied(law: Any) -> Any:
-    """Return a copy of the ``law`` that shares nothing with it.
+@contextmanager
+def refusing_hidden_memory(law: Any) -> Iterator[Any]:
+    """Give a copy of the ``law`` to be called, and leave the law and its module as they were.
 
     Raises:
-        Untraceable: it says ``compiled = False``, or cannot be copied.
+        Untraceable: it says ``compiled = False``; cannot be copied; or has changed itself, or a
+            variable of its module, when the context ends.
     """
     if not getattr(law, "compiled", True):
         raise Untraceable("the law says compiled = False")
+    variables = getattr(type(law).step, "__globals__", {})
+    kept = (*_VALUES, *_COLLECTIONS, dict, np.ndarray)
     try:
-        return copy.deepcopy(law)
+        called = copy.deepcopy(law)
+        before = {n: copy.deepcopy(v) for n, v in variables.items() if isinstance(v, kept)}
     except Exception as error:
         raise Untraceable(f"the law cannot be copied: {type(error).__name__}: {error}") from error
-
-
-def refuse_hidden_memory(law: Any, before: Any) -> None:
-    """Refuse a ``law`` whose attributes have changed since it was a copy of ``before``.
-
-    Raises:
-        Untraceable: with the attribute that has.
-    """
-    earlier = getattr(before, "__dict__", {})
-    for name, value in getattr(law, "__dict__", {}).items():
-        if name not in earlier:
-            continue  # computed at its first use
-        was = earlier[name]
-        changed = isinstance(value, _PLAIN) and value != was and value == value
-        if changed or type(value) is not type(was) or _length(value) != _length(was):
+    try:
+        yield called
+    finally:
+        changed = [name for name, value in before.items() if not _same(variables.get(name), value)]
+        variables.update({name: before[name] for name in changed})
+    if changed:
+        raise Untraceable(f"the law changes {changed[0]} of its module")
+    mine, its = (getattr(each, "__dict__", {}) for each in (law, called))
+    for name in mine.keys() & its.keys():  # others are computed at their first use
+        if not _same(its[name], mine[name]):
             raise Untraceable(f"the law changes its own {name}")
 
 
-def _length(value: Any) -> int:
-    """Return how many a collection holds; 0 of anything else."""
-    return len(value) if isinstance(value, (list, dict, set, tuple, deque)) else 0
+def _same(one: Any, other: Any, depth: int = _DEPTH) -> bool:
+    """Return whether the two, one of which was a copy of the other, are still alike."""
+    if one is other or depth == 0:
+        return True
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return bool(one.shape == other.shape and one.tobytes() == other.tobytes())
+    if isinstance(one, _VALUES):
+        return bool(one == other) or one != one
+    if isinstance(one, set):
+        return bool(one == other)
+    if isinstance(one, _COLLECTIONS):
+        pairs = zip(one, other, strict=False)
+        return len(one) == len(other) and all(_same(a, b, depth - 1) for a, b in pairs)
+    if not isinstance(one, dict):
+        one, other = getattr(one, "__dict__", {}), getattr(other, "__dict__", {})
+        return all(_same(one[name], other[name], depth - 1) for name in one.keys() & other.keys())
+    return one.keys() == other.keys() and all(_same(v, other[k], depth - 1) for k, v in one.items())

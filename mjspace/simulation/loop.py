@@ -11,7 +11,7 @@ from mujoco.batch import SimulationError
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.compiled_blocks import CompiledBlocks
+from mjspace.simulation.compiled_blocks import CompiledBlocks, stopped_at
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.events import with_declared_events
 from mjspace.simulation.flown_law import FlownLaw
@@ -101,7 +101,7 @@ class _Flight:
         self._law = FlownLaw(assembly.law, start.law, len(members))
         inner = self._law.inner if assembly.inner else None
         self.stepper = Stepper(assembly, start, members, threads=threads, inner=inner)
-        self.compiled = CompiledBlocks(assembly, start, self.stepper, self._law, threads)
+        self.compiled = CompiledBlocks(assembly, start, members, self.stepper, self._law, threads)
         # Each period, with law, signals and measurement.
         recorded = 4 * self.stepper.batch.state.nbytes
         self._periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
@@ -124,7 +124,9 @@ class _Flight:
         seconds = self.compiled.seconds or clock.monotonic() - began  # of a period
         count = min(count, max(2, int(min(count, BLOCK_SECONDS / seconds))))
         if count > 1 and columns is not None and trouble is None:
-            columns = self.compiled.fly(period, columns, count, last, desired, stop)
+            due = clock.monotonic() + BLOCK_SECONDS
+            ends = lambda: stop() or clock.monotonic() > due  # noqa: E731 - both are conditions
+            columns, trouble = self.compiled.fly(period, columns, count, last, desired, ends)
         return columns, desired, trouble
 
     def _fly_in_python(
@@ -155,8 +157,7 @@ class _Flight:
                     if stop() or clock.monotonic() > due:
                         break
         except (SimulationError, FlightError) as error:
-            trouble = FlightError(f"stopped at t = {now:.6g} s: {error}")
-            trouble.__cause__ = error.__cause__ or error
+            trouble = stopped_at(now, error)
         raised = np.flatnonzero(self.stepper.batch.warning[:, :, 1].any(axis=0))
         if trouble is None and len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name

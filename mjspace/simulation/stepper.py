@@ -94,6 +94,14 @@ class Stepper:
         period.measurement = self._measure(number * self._steps, period.truth)
         return period
 
+    def check(self, command: Any) -> None:
+        """Refuse a law's ``command`` that the actuators cannot obey.
+
+        Raises:
+            FlightError: it lacks a field that they take, or the field has another shape.
+        """
+        self._actuators.check(command, len(self.batch.state))
+
     def begin(self, period: ControlPeriod, *, flown: bool = True) -> None:
         """Fly the first integration step of a sensed ``period`` that has a command and signals.
 

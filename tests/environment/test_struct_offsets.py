@@ -13,9 +13,10 @@ _OTHER_MODEL = """
   <option timestep="0.25"/>
   <size nuserdata="3"/>
   <worldbody>
-    <body><freejoint/><geom size="1"/></body>
+    <body><freejoint name="first"/><geom size="1"/></body>
     <body pos="9 0 0"><freejoint/><geom size="2"/></body>
   </worldbody>
+  <actuator><motor joint="first" gear="1 0 0 0 0 0"/></actuator>
   <sensor><clock/></sensor>
 </mujoco>
 """
