@@ -125,13 +125,17 @@ class SensorSuite:
 
         Both are as ``biases`` and, of one sample, as ``draws`` return them; or they are traced.
         """
+
+        def whichever(name: str) -> Callable[[int], Any]:
+            return lambda sample: draws[name]
+
         other = copy.copy(self)
         other._sampled = [
             replace(
                 sensor,
                 bias=biases[sensor.name],
-                white=lambda _, name=sensor.name: draws[f"{name}_white"],
-                increment=lambda _, name=sensor.name: draws[f"{name}_increment"],
+                white=whichever(f"{sensor.name}_white"),
+                increment=whichever(f"{sensor.name}_increment"),
             )
             for sensor in self._sampled
         ]
