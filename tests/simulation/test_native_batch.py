@@ -97,7 +97,10 @@ def test_an_error_of_mujoco_is_raised_and_names_the_vehicles() -> None:
 
 
 def test_fields_that_mujoco_refuses_raise() -> None:
-    model = mujoco.MjModel.from_xml_string(PENDULUM.replace("<joint", "<joint type='slide'"))
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><joint type='slide'/>"
+        "<geom size='0.1' mass='1' contype='0' conaffinity='0'/></body></worldbody></mujoco>"
+    )
     masses = np.tile(model.body_mass, (3, 1))
     masses[1, 1] = 0.0
     with pytest.raises(SimulationError) as raised:
