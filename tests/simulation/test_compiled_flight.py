@@ -2,7 +2,7 @@
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.initial_state import Start, first_start
 from mjspace.simulation.loop import fly
+from mjspace.simulation.stepper import Stepper
 from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
 pytestmark = pytest.mark.filterwarnings(
@@ -44,10 +45,9 @@ class Flown(NamedTuple):
 
 
 @pytest.fixture(autouse=True)
-def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(loop, "BLOCK_PERIODS", 40)
     monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
-    return
 
 
 def assembly(name: str, *overrides: str, folder: Path | None = None) -> Assembly:
@@ -168,7 +168,7 @@ def test_any_logged_period_is_a_start(name: str) -> None:
     first = first_start(built, (0,))
     reference = built.reference.at(np.zeros(1))
     law = built.law.reset(
-        loop.Stepper(built, first).sense(0).measurement, type(reference)(*(a[0] for a in reference))
+        Stepper(built, first).sense(0).measurement, type(reference)(*(a[0] for a in reference))
     )
     state = type(law)(*(logged["law"][field] for field in law._fields)) if law else ()
     start = Start(

@@ -119,9 +119,12 @@ def test_it_is_freed_when_nothing_of_it_is_held(
     freed: list[int] = []
     library = native_batch.library()
     delete = library.mjb_deleteBatch
-    monkeypatch.setattr(
-        library, "mjb_deleteBatch", lambda batch: (freed.append(batch), delete(batch))
-    )
+
+    def deleted(batch: int) -> None:
+        freed.append(batch)
+        delete(batch)
+
+    monkeypatch.setattr(library, "mjb_deleteBatch", deleted)
     batch = NativeBatch(pendulum, 2, 1, {})
     gone, state = weakref.ref(batch), batch.state
     del batch
