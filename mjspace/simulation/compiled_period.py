@@ -134,7 +134,7 @@ class _Tracing:
         self.draws = {name: self._held(array[0]) for name, array in suite.draws([1]).items()}
         self.inputs += [*self.sensors.values(), *self.biases.values(), *self.draws.values()]
         self.suite = suite.with_errors(
-            self._all_traced_of(self.biases), self._all_traced_of(self.draws)
+            self._traced_arrays(self.biases), self._traced_arrays(self.draws)
         )
         law = assembly.law
         self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
@@ -143,7 +143,7 @@ class _Tracing:
         """Return the program of sensors, law and actuators.
 
         Raises:
-            Untraceable: as ``compile_period``; or the sensors err.
+            Untraceable: as ``compile_period``; or sensors sample at times of their own.
         """
         steps = self.assembly.scenario.rates.steps
         if self.suite.ticks - {steps}:
@@ -152,7 +152,7 @@ class _Tracing:
         with self.program.section() as sensing:
             # Not of sample 0, which integrating sensors begin with.
             sampled, measurement = self.suite.sample(
-                self._all_traced_of(self.sensors), steps, self._truth()
+                self._traced_arrays(self.sensors), steps, self._truth()
             )
             after = self._next(before, tuple(sampled[name] for name in self.sensors))
             reports = self._reports(measurement)
@@ -207,13 +207,13 @@ class _Tracing:
         """Return the program that goes on with the actuators; ``recorded`` is of the law."""
         own = tuple(self.memory.values())
         with self.program.section() as driving:
-            truth, motors, inner = self._truth(), self._all_traced(command), self.law_state
+            truth, motors, inner = self._truth(), self._traced_tuple(command), self.law_state
             if self.assembly.inner:
-                held = self.suite.report(self._all_traced_of(self.sensors), truth)
+                held = self.suite.report(self._traced_arrays(self.sensors), truth)
                 inner, motors = self._law_inner(motors, held)
                 inner = self._next(self.law_state, inner)
             memory, applied, saturated = self.assembly.actuators.act(
-                self._all_traced_of(self.memory), motors, truth, self.assembly.hold
+                self._traced_arrays(self.memory), motors, truth, self.assembly.hold
             )
             outputs = self._numbers(applied)
             (cut,) = self._numbers((saturated,))
@@ -251,7 +251,7 @@ class _Tracing:
     def _truth(self) -> Any:
         physics: Any = self._traced(self.physics)
         return truth_of(
-            physics, self._all_traced_of(self.memory), self.layout, self.assembly.actuators, ()
+            physics, self._traced_arrays(self.memory), self.layout, self.assembly.actuators, ()
         )
 
     def _reports(self, measurement: Any) -> list[Recorded]:
@@ -270,13 +270,13 @@ class _Tracing:
     def _law_step(self, measurement: Any) -> tuple[Any, Any, Any]:
         unbatched = isinstance(self.assembly.law, UnbatchedLaw)
         step = UnbatchedLaw(self.law).step_of_one if unbatched else self.law.step
-        state, reference = self._all_traced(self.law_state), self._all_traced(self.reference)
+        state, reference = self._traced_tuple(self.law_state), self._traced_tuple(self.reference)
         with _of_the_law():
             after, command, signals = step(state, self._traced(self.time), measurement, reference)
         return after or (), command, signals or ()
 
     def _law_inner(self, command: Any, measurement: Any) -> tuple[Any, Any]:
-        state = self._all_traced(self.law_state)
+        state = self._traced_tuple(self.law_state)
         with _of_the_law():
             after, motors = self.law.inner(state, self._traced(self.time), command, measurement)
         return after or (), motors
@@ -293,13 +293,10 @@ class _Tracing:
         view.setflags(write=False)
         return TracedArray(view, self.program)
 
-    def _all_traced(self, arrays: Any) -> Any:
+    def _traced_tuple(self, arrays: Any) -> Any:
         return _tuple_like(arrays, map(self._traced, arrays))
 
-    def _all_traced_memory(self) -> dict[str, Any]:
-        return {name: self._traced(array) for name, array in self.memory.items()}
-
-    def _all_traced_of(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+    def _traced_arrays(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         return {name: self._traced(array) for name, array in arrays.items()}
 
     def _next(self, before: Any, after: Any) -> Any:
@@ -313,8 +310,8 @@ class _Tracing:
             else self._own(value)
             for own, value in zip(before, after, strict=True)
         ]
-        if [each.shape for each in arrays] != [each.shape for each in before]:
-            raise Untraceable("a state has other shapes after a step")
+        if [(a.shape, a.dtype) for a in arrays] != [(a.shape, a.dtype) for a in before]:
+            raise Untraceable("a state has other shapes or types after a step")
         return _tuple_like(after, arrays)
 
     def _own(self, value: Any) -> np.ndarray:
