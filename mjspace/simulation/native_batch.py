@@ -55,6 +55,10 @@ def address(function: str) -> int:
     return ctypes.cast(getattr(library(), function), ctypes.c_void_p).value or 0
 
 
+class _Memory:
+    """MuJoCo's memory of a batch, freed when nothing refers to this."""
+
+
 class NativeBatch:
     """Simulations of a copy of ``model``, as ``mujoco.batch.Batch`` has them.
 
@@ -78,7 +82,10 @@ class NativeBatch:
         )
         if not self._batch:
             raise ValueError(message.value.decode(errors="replace"))
-        weakref.finalize(self, library().mjb_deleteBatch, self._batch)
+        # The arrays keep this alive, not the batch: NumPy's arrays take part in no cycles that
+        # Python frees.
+        self._memory = _Memory()
+        weakref.finalize(self._memory, library().mjb_deleteBatch, self._batch)
         self.vehicles = vehicles
         size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
         rows = library().mjb_state(self._batch)
@@ -107,7 +114,7 @@ class NativeBatch:
             raise SimulationError(which, message.decode(errors="replace"), self.vehicles)
 
     def _array(self, at: int, kind: Any, shape: tuple[int, ...]) -> np.ndarray:
-        """Return MuJoCo's memory as an array, which keeps this batch alive."""
+        """Return MuJoCo's memory as an array, which keeps that memory alive."""
         memory = (kind * int(np.prod(shape))).from_address(at)
-        memory.owner = self
+        memory.owner = self._memory
         return np.ctypeslib.as_array(memory).reshape(shape)

@@ -34,7 +34,7 @@ class TracedArray(NDArrayOperatorsMixin):
         self.array, self.program = array, program
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        if ufunc is np.power and self._is_number and isinstance(inputs[0], np.generic):
+        if ufunc is np.power and self._is_number and issubclass(type(inputs[0]), np.generic):
             self._refused("a power of one of NumPy's numbers, or np.power of it")
         outputs = options.get("out", ())
         if any(isinstance(each, TracedArray) and each._is_number for each in outputs):

@@ -1,0 +1,372 @@
+"""A flight whose periods are compiled is the flight in Python, bit by bit, event by event."""
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from mujoco.batch import SimulationError
+
+from mjspace.contract import Event
+from mjspace.errors import FlightError
+from mjspace.scenario.loading import load
+from mjspace.simulation import compiled_blocks, loop
+from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.compiled_flight import CompiledFlight
+from mjspace.simulation.initial_state import Start, first_start
+from mjspace.simulation.loop import fly
+from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
+
+pytestmark = pytest.mark.filterwarnings(
+    f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
+)
+
+
+class Flown(NamedTuple):
+    """A flight: rows by topic and field, events, what ended it, and what was compiled."""
+
+    rows: dict[str, np.ndarray]
+    events: list[Event]
+    trouble: str
+    compiled: str
+
+    def bits(self, vehicle: Any = slice(None)) -> dict[str, bytes]:
+        fields = {name: values for name, values in self.rows.items() if name != "time"}
+        return {name: values[:, vehicle].tobytes() for name, values in fields.items()}
+
+    @property
+    def told(self) -> list[Event]:
+        """The events in order of time, vehicle and text, as no block cuts them."""
+        return sorted(self.events)
+
+
+@pytest.fixture(autouse=True)
+def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(loop, "BLOCK_PERIODS", 40)
+    monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
+    return
+
+
+def assembly(name: str, *overrides: str, folder: Path | None = None) -> Assembly:
+    scenario, beside = load(name, ["checks=[]", *overrides])
+    return assemble(scenario, folder or beside)
+
+
+def flown(
+    built: Assembly,
+    members: Sequence[int] = (0,),
+    *,
+    compiled: bool = True,
+    start: Start | None = None,
+    threads: int = 1,
+    stop: Callable[[], bool] = lambda: False,
+) -> Flown:
+    made: list[Any] = []
+    initialize = compiled_blocks.CompiledBlocks.__init__
+
+    def initialized(self: Any, *arguments: Any) -> None:
+        initialize(self, *arguments)
+        self.on = self.on and compiled
+        made.append(self)
+
+    blocks, trouble = [], ""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compiled_blocks.CompiledBlocks, "__init__", initialized)
+        try:
+            for block in fly(
+                built, start or first_start(built, members), members, threads=threads, stop=stop
+            ):
+                blocks.append(block)
+        except FlightError as error:
+            trouble = str(error)
+    rows = {
+        f"{topic}.{field}": np.concatenate([block.rows[topic][field] for block in blocks])
+        for topic, fields in blocks[0].rows.items()
+        for field in fields
+    }
+    rows["time"] = np.concatenate([block.time for block in blocks])[:, None]
+    return Flown(rows, [e for block in blocks for e in block.events], trouble, str(made[0]))
+
+
+def assert_same(one: Flown, other: Flown) -> None:
+    assert one.rows.keys() == other.rows.keys()
+    for name, values in one.rows.items():
+        assert values.shape == other.rows[name].shape, name
+        assert values.tobytes() == other.rows[name].tobytes(), name
+    assert one.told == other.told
+    assert one.trouble == other.trouble
+
+
+WHOLE = "compiled: sensors, law and actuators"
+SCENARIOS = {
+    "contraction-adaptive": ["duration=0.2", "plant.wheels.torque_limit=5"],
+    "dgvscmg-tracking": ["duration=0.1"],
+    "pd-plus": ["duration=0.1"],
+    "detumble-wheels": [
+        "duration=0.2",
+        "events=[{name='slow',signal='truth.rate[0]',below=0.29}]",
+    ],
+    "contraction-ideal": ["duration=0.5", "rates.control='10 ms'"],
+}
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_compiled_rows_and_events_are_pythons(name: str) -> None:
+    built = assembly(name, *SCENARIOS[name])
+    compiled, python = flown(built), flown(built, compiled=False)
+    assert compiled.compiled == WHOLE
+    assert not compiled.trouble
+    assert_same(compiled, python)
+    if name == "contraction-adaptive":
+        assert any("saturated" in event.message for event in compiled.events)
+
+
+@pytest.mark.parametrize("name", ["contraction-adaptive", "dgvscmg-tracking"])
+def test_vehicles_are_alike_alone_and_together_at_any_number_of_threads(name: str) -> None:
+    built = assembly(name, *SCENARIOS[name], "duration=0.05")
+    members = (0, 1, 2, 3)
+    start = first_start(built, members)
+    physics = start.physics.copy()
+    physics[:, 1:] *= 1.0 + 1e-3 * np.arange(4.0)[:, None]  # no two fly alike
+    start = dataclasses.replace(start, physics=physics)
+    python = flown(built, members, compiled=False, start=start)
+    for threads in (1, 2, 3):
+        together = flown(built, members, start=start, threads=threads)
+        assert together.compiled == WHOLE
+        assert_same(together, python)
+    alone = flown(built, [2], start=_of(start, 2))
+    assert alone.bits(0) == python.bits(2)
+    assert python.bits(1) != python.bits(2)
+
+
+def _of(start: Start, vehicle: int) -> Start:
+    """Return one vehicle's part of a start."""
+
+    def part(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {name: values[vehicle : vehicle + 1] for name, values in arrays.items()}
+
+    return dataclasses.replace(
+        start,
+        physics=start.physics[vehicle : vehicle + 1],
+        sensors=part(start.sensors),
+        actuators=part(start.actuators),
+    )
+
+
+@pytest.mark.parametrize("name", ["contraction-adaptive", "dgvscmg-tracking"])
+def test_any_logged_period_is_a_start(name: str) -> None:
+    built = assembly(name, *SCENARIOS[name])
+    whole, middle = flown(built), 57
+    logged: dict[str, dict[str, np.ndarray]] = {"sensor": {}, "actuator": {}, "law": {}}
+    for topic, values in whole.rows.items():
+        kind, _, field = topic.removeprefix("/state.").partition("_")
+        if topic.startswith("/state.") and kind in logged:
+            logged[kind][field] = values[middle]
+    first = first_start(built, (0,))
+    reference = built.reference.at(np.zeros(1))
+    law = built.law.reset(
+        loop.Stepper(built, first).sense(0).measurement, type(reference)(*(a[0] for a in reference))
+    )
+    state = type(law)(*(logged["law"][field] for field in law._fields)) if law else ()
+    start = Start(
+        middle, whole.rows["/state.physics"][middle], logged["sensor"], state, logged["actuator"]
+    )
+    again = flown(built, start=start)
+    assert again.compiled == WHOLE
+    for field, values in again.rows.items():
+        assert values.tobytes() == whole.rows[field][middle:].tobytes(), field
+
+
+def test_vehicles_may_have_models_of_their_own() -> None:
+    built = assembly("contraction-ideal", "duration=0.05")
+    model, members = built.vehicle.model, (0, 1, 2)
+    fields = {
+        "body_mass": np.tile(model.body_mass, (3, 1)) * [[1.0], [1.1], [1.2]],
+        "body_inertia": np.tile(model.body_inertia, (3, 1, 1)) * [[[1.0]], [[1.1]], [[1.2]]],
+    }
+    start = dataclasses.replace(first_start(built, members), model=fields)
+    compiled = flown(built, members, start=start, threads=2)
+    assert compiled.compiled == WHOLE
+    assert_same(compiled, flown(built, members, start=start, compiled=False))
+    assert compiled.bits(0) != compiled.bits(1)
+    assert compiled.bits(0)["/state.physics"] == flown(built).bits(0)["/state.physics"]
+
+
+HEAD = """
+from typing import NamedTuple
+import numpy as np
+from mjspace import attitude
+from mjspace.contract import TorqueCommand
+
+class State(NamedTuple):
+    integral: np.ndarray
+    slowed: np.ndarray
+
+class Signals(NamedTuple):
+    error: np.ndarray
+    size: np.ndarray
+
+class Law:
+    def __init__(self):
+        self.inertia = np.diag([15.0, 12.0, 18.0])
+        self.noise = np.random.default_rng(3)
+        self.size = 0.0
+
+    def reset(self, measurement, reference):
+        return State(np.zeros(3), np.zeros(()))
+
+    def step(self, state, time, measurement, reference):
+        turned = attitude.multiply(attitude.conjugate(reference.attitude), measurement.attitude)
+        error = np.copysign(1.0, turned[0]) * turned[1:]
+        rate = measurement.rate - reference.rate
+        integral = np.clip(state.integral + 1e-3 * error, -0.1, 0.1)
+        size = np.linalg.norm(rate)
+        torque = -self.inertia @ (2.0 * rate + error + 0.1 * integral)
+        torque += np.cross(measurement.rate, self.inertia @ measurement.rate)
+        torque = np.where(size > 0.2, 0.5, 1.0) * torque
+        slowed = state.slowed * 0.99 + size**2
+        {trouble}
+        signals = Signals(np.concatenate([error, size[None]]), size / (1.0 + time))
+        return State(integral, slowed), TorqueCommand(torque), signals
+"""
+
+
+def own_law(folder: Path, trouble: str = "", duration: float = 0.2, *more: str) -> Assembly:
+    (folder / "own.py").write_text(HEAD.replace("{trouble}", trouble))
+    return assembly(
+        "contraction-ideal", f"duration={duration}", "law={kind='own.py:Law'}", *more, folder=folder
+    )
+
+
+def test_an_unbatched_law_of_ones_own_is_compiled(tmp_path: Path) -> None:
+    built = own_law(tmp_path)
+    compiled = flown(built, (0, 1), threads=2)
+    assert compiled.compiled == WHOLE
+    assert_same(compiled, flown(built, (0, 1), compiled=False))
+
+
+@pytest.mark.parametrize(
+    ("trouble", "reason"),
+    [
+        ("torque = torque if size > 0.1 else 2.0 * torque", "a branch on a measured value"),
+        ("torque[0] = float(error[0])", "a Python number"),
+        ("torque = np.array([torque[0], 0.0, 0.0])", "np.stack"),
+        ("self.size = size", "the law changes its own size"),
+        ("torque[np.argmax(error)] = 0.0", "np.argmax"),
+    ],
+)
+def test_a_law_that_cannot_be_compiled_is_called_in_python(
+    trouble: str, reason: str, tmp_path: Path
+) -> None:
+    built = own_law(tmp_path, trouble)
+    mixed, python = flown(built), flown(built, compiled=False)
+    assert mixed.compiled.startswith("actuators compiled; sensors and law called in Python: ")
+    assert reason in mixed.compiled
+    assert_same(mixed, python)
+
+
+def test_a_law_with_dice_is_noticed_and_flown_in_python(tmp_path: Path) -> None:
+    # A generator's state is nowhere to be seen, but the first period shows it.
+    trouble = "torque = torque + self.noise.normal(size=3)"
+    with pytest.warns(RuntimeWarning, match=r"compiled, .* differs .* at t = 0 s") as caught:
+        compiled = flown(own_law(tmp_path, trouble))
+    assert sum(warning.category is RuntimeWarning for warning in caught) == 1
+    assert compiled.compiled.startswith("flown in Python: ")
+    assert_same(compiled, flown(own_law(tmp_path, trouble), compiled=False))
+
+
+def test_a_wrong_program_is_noticed_and_the_flight_goes_on_in_python(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    built = assembly("contraction-adaptive", *SCENARIOS["contraction-adaptive"])
+    python = flown(built, compiled=False)
+    columns, calls = CompiledFlight.columns, 0
+
+    def wrong(self: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        found = columns(self)
+        if calls == 3:  # of the third block
+            found["command"]["torque"][0, 0, 1] *= 1.0 + 1e-15
+        return found
+
+    monkeypatch.setattr(CompiledFlight, "columns", wrong)
+    with pytest.warns(RuntimeWarning, match=r"command torque differs .* t = 0\.08 s") as caught:
+        found = flown(built)
+    assert (len(caught), calls) == (1, 3)
+    assert found.compiled == "flown in Python: command torque differs from Python's"
+    assert_same(found, python)
+
+
+@pytest.mark.parametrize(
+    ("trouble", "message"),
+    [
+        ("torque = torque + np.where(time > 0.0605, np.inf, 0.0)", "/command.torque is not finite"),
+        ("torque = torque * np.where(time > 0.0605, np.nan, 1.0)", "/command.torque is not finite"),
+        ("torque = torque * np.where(time > 0.0605, 1e20, 1.0)", "/command.torque is not finite"),
+        # One that can be commanded, and moves faster than MuJoCo flies.
+        ("torque = torque * 0.0 + np.where(time > 0.0605, 9e9, 0.0)", "/state.physics is not"),
+    ],
+)
+def test_trouble_in_a_block_ends_the_flight_as_in_python(
+    trouble: str, message: str, tmp_path: Path
+) -> None:
+    built = own_law(tmp_path, trouble)
+    compiled, python = flown(built), flown(built, compiled=False)
+    assert message in python.trouble
+    assert_same(compiled, python)
+    assert compiled.compiled == "flown in Python: MuJoCo warned"
+    assert 55 <= len(compiled.rows["time"]) <= 70
+
+
+def test_what_a_law_raises_ends_the_flight_as_in_python(tmp_path: Path) -> None:
+    # Of a law that is called in each period, between compiled steps.
+    built = own_law(tmp_path, "assert time < 0.0605, 'too late'")
+    compiled, python = flown(built), flown(built, compiled=False)
+    assert "actuators compiled" in compiled.compiled
+    assert "too late" in python.trouble
+    assert_same(compiled, python)
+
+
+def test_an_error_of_mujoco_in_a_block_is_met_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    built = assembly("contraction-ideal", "duration=0.1")
+    python, calls = flown(built, compiled=False), 0
+    flies = CompiledFlight.fly
+
+    def failing(self: Any, count: int, command: Any = None) -> None:
+        nonlocal calls
+        calls += 1
+        flies(self, count, command)
+        if calls == 2:
+            raise SimulationError(np.array([0]), "no room", 1)
+
+    monkeypatch.setattr(CompiledFlight, "fly", failing)
+    found = flown(built)
+    assert "no room" in found.compiled
+    assert_same(found, python)
+
+
+def test_stop_ends_it_after_the_block() -> None:
+    calls = 0
+
+    def stop() -> bool:
+        nonlocal calls
+        calls += 1
+        return calls > 4
+
+    built = assembly("contraction-ideal", "duration=1")
+    found, whole = flown(built, stop=stop), flown(built)
+    rows = len(found.rows["time"])
+    assert 40 <= rows < 250
+    for field, values in found.rows.items():
+        assert values.tobytes() == whole.rows[field][:rows].tobytes()
+
+
+def test_a_compiled_flight_warns_of_nothing() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", UnphysicalInertiaWarning)
+        flown(assembly("contraction-ideal", "duration=0.1"))
