@@ -11,8 +11,9 @@ from mujoco.batch import SimulationError
 from mjspace.contract import Array, DesiredMotion
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.compile_period import compile_period
 from mjspace.simulation.compiled_flight import CompiledFlight
-from mjspace.simulation.compiled_period import CompiledPeriod, compile_period
+from mjspace.simulation.compiled_period import CompiledPeriod
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import Start

@@ -51,9 +51,11 @@ class CompiledFlight:
         places, size = _packed(remembered)
         self._rows = np.zeros((vehicles, size), np.uint8)
         views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
-        each = iter(views)
-        self.memory, self.sensors, biases = ({name: next(each) for name in of} for of in named)
-        views = list(each)
+        one_by_one = iter(views)
+        self.memory, self.sensors, biases = (
+            {name: next(one_by_one) for name in arrays} for arrays in named
+        )
+        views = list(one_by_one)
         for name, bias in self._suite.biases.items():
             biases[name][...] = bias
         self.law = type(period.law)(*views[: len(period.law)]) if period.law else ()
@@ -70,15 +72,10 @@ class CompiledFlight:
     ) -> None:
         """Put the vehicles there, with what is remembered."""
         self.physics[...] = physics
-        for target, values in zip(
-            (*self.memory.values(), *self.sensors.values(), *self.law),
-            (
-                *(memory[name] for name in self.memory),
-                *(sensors[name] for name in self.sensors),
-                *law,
-            ),
-            strict=True,
-        ):
+        for own, others in ((self.memory, memory), (self.sensors, sensors)):
+            for name, values in own.items():
+                values[...] = others[name]
+        for target, values in zip(self.law, law, strict=True):
             target[...] = values
 
     def begin(self, first: int, count: int, last: int, desired: DesiredMotion) -> None:
