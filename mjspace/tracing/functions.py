@@ -52,12 +52,19 @@ def move(program: Program, function: Callable[[Any], np.ndarray], data: Any) -> 
     held = [ufuncs.in_memory(program, each, kind) for each in arrays]
     result = function(held if several else held[0])
     if isinstance(result, np.ndarray) and program.holds(result):
-        return result
+        return result if result.ndim or result.flags.writeable else _array_of(program, result)
     places = [_places(program, each) for each in held]
     sources = np.asarray(function(places if several else places[0]))
     target = program.result(result)
     by_stride = np.argsort([-step for step in target.strides], kind="stable")
     _gather(program, *(each.transpose(by_stride).reshape(-1) for each in (sources, target)))
+    return target
+
+
+def _array_of(program: Program, number: _Array) -> _Array:
+    """Return an array of no dimensions, which nothing takes for a number."""
+    target = program.copied(number)
+    program.copy(number, target)
     return target
 
 

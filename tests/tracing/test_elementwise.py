@@ -115,6 +115,11 @@ def test_powers_of_elements_are_those_of_numbers(exponent: float) -> None:
     assert_replays(function, [first], [then])
     assert_replays(lambda x: abs(x) ** exponent, [first], [then])
 
+    def of_arrays(x: Any) -> Any:  # of no dimensions
+        return np.stack([x[k, ...] ** exponent for k in range(400)])
+
+    assert_replays(of_arrays, [abs(first)], [abs(then)])
+
 
 MASKS: list[Callable[[Any, Any, Any], Any]] = [
     lambda x, y, m: m & (x > 0.0),
