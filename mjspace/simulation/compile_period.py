@@ -64,10 +64,10 @@ class _Tracing:
     ) -> None:
         self.assembly, self.layout = assembly, layout
         self.program = program = Program()
-        self.time = program.copied(example.time)
-        self.physics = program.copied(example.physics[:1])
-        self.sensordata = program.copied(example.sensordata[:1])
-        self.reference = type(reference)(*map(program.copied, reference))
+        self.time = program.copied(_elsewhere(example.time))
+        self.physics = program.copied(_elsewhere(example.physics[:1]))
+        self.sensordata = program.copied(_elsewhere(example.sensordata[:1]))
+        self.reference = type(reference)(*(program.copied(_elsewhere(a)) for a in reference))
         self.memory = {name: self._held(array) for name, array in example.memory.items()}
         self.law_state = _tuple_like(example.law, map(self._held, example.law))
         self.inputs = [self.time, self.physics, *self.memory.values(), *self.law_state]
@@ -230,7 +230,7 @@ class _Tracing:
         array = np.asarray(array)
         if array.dtype not in (np.dtype(float), np.dtype(bool)):
             raise Untraceable(f"a state of {array.dtype}")
-        return self.program.copied(array[:1])
+        return self.program.copied(_elsewhere(array[:1]))
 
     def _traced(self, array: np.ndarray) -> Any:
         view = array.view()
@@ -250,7 +250,8 @@ class _Tracing:
         """
         arrays = [
             value.array
-            if isinstance(value, TracedArray) and value.array.ctypes.data == own.ctypes.data
+            if isinstance(value, TracedArray)
+            and (value.array.ctypes.data, value.array.strides) == (own.ctypes.data, own.strides)
             else self._own(value)
             for own, value in zip(before, after, strict=True)
         ]
@@ -278,6 +279,15 @@ class _Tracing:
                 for value in values
             ),
         )
+
+
+def _elsewhere(values: Any) -> np.ndarray:
+    """Return values near those of the flight, and none of them.
+
+    If one of them is frozen in the program, the first period that it flies shows it.
+    """
+    array = np.asarray(values)
+    return ~array if array.dtype == bool else array * (1.0 + 1e-6) + 1e-9
 
 
 @contextmanager

@@ -91,13 +91,7 @@ class CompiledBlocks:
         if flight.warned:
             self._off("MuJoCo warned", after)
             return columns, None
-        different = _difference(columns, compiled)
-        if (
-            not different
-            and len(compiled) > 1
-            and compiled.physics[1].tobytes() != after.physics.tobytes()
-        ):
-            different = "the state after a period"
+        different = _difference(columns, compiled) or after.difference(compiled)
         if different:
             warnings.warn(
                 f"compiled, {different} differs from what Python computes at t = "
@@ -206,6 +200,21 @@ class _After(NamedTuple):
     memory: State
     sensors: State
     law: Any
+
+    def difference(self, compiled: Columns) -> str:
+        """Return the name of the first field whose second row is another; "" for none."""
+        names = getattr(self.law, "_fields", ())
+        groups = {
+            "physics": {"": self.physics},
+            "memory": self.memory,
+            "sensors": self.sensors,
+            "law": dict(zip(names, self.law or (), strict=True)),
+        }
+        for group, arrays in groups.items():
+            for name, rows in compiled[group].items():
+                if len(rows) > 1 and _bits(rows[1]) != _bits(arrays[name]):
+                    return f"{group} {name} after a period".replace("  ", " ")
+        return ""
 
 
 def _difference(one: Columns, other: Columns) -> str:

@@ -370,3 +370,57 @@ def test_a_compiled_flight_warns_of_nothing() -> None:
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", UnphysicalInertiaWarning)
         flown(assembly("contraction-ideal", "duration=0.1"))
+
+
+@pytest.mark.parametrize(
+    "frozen",
+    [
+        "measurement.rate",
+        "measurement.attitude[:3]",
+        "reference.rate + 0.0 * measurement.rate",
+        "state.integral",
+        "time + np.zeros_like(measurement.rate)",
+    ],
+)
+def test_a_frozen_value_is_noticed_in_the_first_block(frozen: str, tmp_path: Path) -> None:
+    # What no law can have by chance: the numbers inside a traced array.
+    trouble = f"value = {frozen}; torque = torque + getattr(value, 'array', value).copy()"
+    with pytest.warns(RuntimeWarning, match=r"compiled, .* differs .* at t = 0 s"):
+        compiled = flown(own_law(tmp_path, trouble))
+    assert_same(compiled, flown(own_law(tmp_path, trouble), compiled=False))
+
+
+def test_a_frozen_value_in_the_next_state_is_noticed_too(tmp_path: Path) -> None:
+    trouble = "slowed = slowed + getattr(state.slowed, 'array', state.slowed).copy()"
+    with pytest.warns(RuntimeWarning, match=r"compiled, law slowed after a period differs"):
+        compiled = flown(own_law(tmp_path, trouble))
+    assert_same(compiled, flown(own_law(tmp_path, trouble), compiled=False))
+
+
+TURNING = """
+from typing import NamedTuple
+import numpy as np
+from mjspace.contract import TorqueCommand
+
+class State(NamedTuple):
+    matrix: np.ndarray
+
+class Law:
+    batched = True
+
+    def reset(self, measurement, reference):
+        return State(np.tile(np.arange(9.0).reshape(3, 3), (len(measurement.rate), 1, 1)))
+
+    def step(self, state, time, measurement, reference):
+        torque = (state.matrix @ measurement.rate[..., None])[..., 0]
+        return State(np.swapaxes(state.matrix, -1, -2)), TorqueCommand(torque), None
+"""
+
+
+def test_a_state_that_is_turned_about_is_another(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(TURNING)
+    law = ["duration=0.1", "law={kind='own.py:Law'}"]
+    built = assembly("contraction-ideal", *law, folder=tmp_path)
+    compiled = flown(built)
+    assert compiled.compiled == WHOLE
+    assert_same(compiled, flown(built, compiled=False))
