@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from mjspace.contract import DesiredMotion, Law, Measurement
 from mjspace.errors import failure
 from mjspace.simulation.user_code import (
@@ -44,7 +46,7 @@ class FlownLaw:
             if self.state is None:
                 state = self._law.reset(measurement, reference)
                 check_state(state)
-                self.state = read_only(state or ())
+                self.state = _kept(state)
             before = self.state
             returned = self._law.step(before, time, measurement, reference)
         except ReturnError:
@@ -53,7 +55,7 @@ class FlownLaw:
             raise failure("the law", error) from error
         self._check(before, returned)
         state, command, signals = returned
-        self.state = read_only(state or ())
+        self.state = _kept(state)
         return before, read_only(command), read_only(signals or ())
 
     def inner(self, time: float, command: Any, measurement: Measurement) -> Any:
@@ -67,7 +69,7 @@ class FlownLaw:
         except Exception as error:
             raise failure("the law's inner loop", error) from error
         check_inner(returned)
-        self.state = read_only(returned[0] or ())
+        self.state = _kept(returned[0])
         return returned[1]
 
     def _check(self, before: Any, returned: Any) -> None:
@@ -83,3 +85,14 @@ class FlownLaw:
             check_step(returned)
             for name, part, first in zip(names, returned, self._first, strict=True):
                 check_same_shapes(name, part, first)
+
+
+def _kept(state: Any) -> Any:
+    """Return a law's state as a log keeps it, read-only.
+
+    Of an array that lies otherwise, a transposed one for example, NumPy adds up in another order:
+    a flight from a logged state would differ in the last digits.
+    """
+    if not state:
+        return ()
+    return read_only(type(state)(*(np.asarray(array, order="C") for array in state)))
