@@ -45,7 +45,7 @@ def reductions(draw: Any) -> tuple[Any, ...]:
 
 
 @given(st.sampled_from(REDUCTIONS), reductions(), seeds)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=120, deadline=None)
 def test_reductions_add_up_in_numpys_order(function: Any, case: Any, seed: int) -> None:
     shape, layout, axis, keepdims = case
 
@@ -185,7 +185,7 @@ STEPS: list[Callable[[Any, Any], Any]] = [
 
 
 @given(st.lists(st.sampled_from(STEPS), min_size=2, max_size=6), seeds)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_programs_of_several_steps(steps: Any, seed: int) -> None:
     def program(x: Any, y: Any) -> Any:
         for step in steps:
