@@ -209,7 +209,8 @@ def test_a_flight_that_breaks_off_has_its_last_row_on_each_topic(
         ("log.state='2.5 ms'", r"log\.state: 0\.0025 s is not a whole number of rates\.control"),
         ("log.default='300 Hz'", r"log\.default: 0\.003333333333 s .* 0\.003 s and 0\.004 s"),
         ("log.tf='0 Hz'", r"log\.tf: got '0 Hz', should be greater than 0"),
-        ("log.law='5 m'", r"log\.law: '5 m' has the unit 'm'"),
+        ("log.law='5 m'", r"log\.law: '5 m' has the unit 'm', should be one of s, .*, Hz, kHz"),
+        ("log.law='5'", r"log\.law: '5' has no unit: write a plain number for s, or .* Hz, kHz"),
         ("log.stat='1 s'", r"log\.stat: no such key: did you mean 'state'\?"),
     ],
 )
