@@ -130,8 +130,8 @@ def to_si(value: Any, unit: str | None) -> Any:
     """Return ``value`` with every quantity string in it converted to the SI unit ``unit``.
 
     A number is taken as SI; a string is a number and a unit of the same dimension, ``"30 deg/s"``,
-    or of any dimension where ``unit`` is None: it becomes a ``Quantity``. Lists are converted element by element and anything
-    else is returned as it is.
+    or of any dimension where ``unit`` is None: it becomes a ``Quantity``. Lists are converted
+    element by element and anything else is returned as it is.
 
     Raises:
         ValueError: the string is not a number with a unit, or the unit measures something else.
