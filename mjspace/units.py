@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, get_type_hints
+from typing import Any, Self, get_type_hints
 
 _DEG = math.pi / 180.0
 _RPM = 2.0 * math.pi / 60.0
@@ -93,6 +93,22 @@ class Unit:
         return name, (1.0 if name == self.si else 1.0 / UNITS[name][1])
 
 
+class Quantity(float):
+    """A number in SI that was written with a unit, and the SI ``unit`` of that."""
+
+    unit: str
+
+    def __new__(cls, value: float, unit: str) -> Self:
+        """Return the number ``value`` of ``unit``."""
+        made = super().__new__(cls, value)
+        made.unit = unit
+        return made
+
+    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
+        """Return what ``__new__`` takes, for copies and pickles."""
+        return float(self), self.unit
+
+
 def units_of(kind: type) -> dict[str, Unit]:
     """Return the units that the fields of the class ``kind`` declare, by field.
 
@@ -114,8 +130,8 @@ def to_si(value: Any, unit: str | None) -> Any:
     """Return ``value`` with every quantity string in it converted to the SI unit ``unit``.
 
     A number is taken as SI; a string is a number and a unit of the same dimension, ``"30 deg/s"``,
-    or of any dimension where ``unit`` is None. Lists are converted element by element and anything
-    else is returned as it is.
+    or of any dimension where ``unit`` is None: it becomes a ``Quantity``. Lists are converted
+    element by element and anything else is returned as it is.
 
     Raises:
         ValueError: the string is not a number with a unit, or the unit measures something else.
@@ -128,16 +144,24 @@ def to_si(value: Any, unit: str | None) -> Any:
         return _any_to_si(value)
     if not unit:
         raise ValueError(f"got the text {value!r}, should be a plain number")
-    magnitude, written = _split(value)
-    right = [name for name, (si, _) in UNITS.items() if si == unit] or [unit]
-    which = f"one of {', '.join(right)}" if len(right) > 1 else unit
+    return quantity(value, unit)
+
+
+def quantity(text: str, *units: str) -> Quantity:
+    """Return the number with a unit ``text`` in SI; its SI unit is one of ``units``.
+
+    Raises:
+        ValueError: it is not a number with a unit, or the unit measures something else.
+    """
+    magnitude, written = _split(text)
+    right = [name for name, (si, _) in UNITS.items() if si in units] or units
+    which = f"one of {', '.join(right)}" if len(right) > 1 else right[0]
     if not written:
-        raise ValueError(f"{value!r} has no unit: write a plain number for {unit}, or {which}")
+        raise ValueError(f"{text!r} has no unit: write a plain number for {units[0]}, or {which}")
     if written not in right:
-        raise ValueError(f"{value!r} has the unit {written!r}, should be {which}")
-    if written == unit:
-        return magnitude
-    return magnitude * UNITS[written][1]
+        raise ValueError(f"{text!r} has the unit {written!r}, should be {which}")
+    unit, factor = UNITS.get(written, (written, 1.0))
+    return Quantity(magnitude * factor, unit)
 
 
 def quantity_in(value: Any, place: str = "") -> tuple[str, str] | None:
@@ -184,7 +208,7 @@ def whole_number(span: float, unit: float, span_key: str, unit_key: str) -> int:
     return count
 
 
-def _any_to_si(value: str) -> float:
+def _any_to_si(value: str) -> Quantity:
     """Return the quantity ``value`` in the SI unit of whatever it measures.
 
     Raises:
@@ -194,7 +218,8 @@ def _any_to_si(value: str) -> float:
     if written not in UNITS:
         what = f"the unknown unit {written!r}" if written else "no unit"
         raise ValueError(f"{value!r} has {what}: have {', '.join(UNITS)}, or write a plain number")
-    return magnitude * UNITS[written][1]
+    unit, factor = UNITS[written]
+    return Quantity(magnitude * factor, unit)
 
 
 def _split(value: str) -> tuple[float, str]:

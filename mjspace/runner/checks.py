@@ -10,8 +10,9 @@ import numpy as np
 from mjspace.contract import TICK, Array
 from mjspace.errors import InputError, input_error_at
 from mjspace.runner.statistic import Statistic
-from mjspace.scenario.scenario import Check, EventTable
+from mjspace.scenario.scenario import Check, EventTable, SignalRegion
 from mjspace.signals import Topics, find_signal, magnitude
+from mjspace.units import Quantity, Unit
 
 Rows = Mapping[str, Mapping[str, Array]]
 
@@ -78,6 +79,37 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
         count = 1 if check.target is None else np.size(check.target)
         if count not in (1, size):
             raise InputError(f"checks.{number}.target: {count} numbers, {check.signal} has {size}")
+
+
+def refuse_other_dimensions(
+    checks: Sequence[Check],
+    events: Sequence[EventTable],
+    topics: Topics,
+    units: Mapping[str, Mapping[str, Unit]],
+) -> None:
+    """Refuse bounds and targets that measure something else than their signal.
+
+    ``units`` are by topic and field. A bound without a unit is in SI, and a signal without one may
+    be anything.
+
+    Raises:
+        InputError: the first of them, with both units.
+    """
+    regions: dict[str, SignalRegion] = {f"checks.{n}": check for n, check in enumerate(checks)}
+    regions |= {f"events.{n}": event for n, event in enumerate(events)}
+    for place, region in regions.items():
+        topic, field, _ = find_signal(topics, region.signal)
+        unit = units.get(topic, {}).get(field)
+        if unit is None:
+            continue
+        for key in ("below", "above", "target"):
+            value = getattr(region, key, None)
+            is_ratio = key != "target" and getattr(region, "relative", False)
+            right = "a plain number, of a relative error" if is_ratio else f"in {unit.si}"
+            for each in value if isinstance(value, list) else [value]:
+                if isinstance(each, Quantity) and (is_ratio or each.unit != unit.si):
+                    what = f"{each:.6g} {each.unit} for {region.signal}"
+                    raise InputError(f"{place}.{key}: got {what}, should be {right}")
 
 
 class Judge:

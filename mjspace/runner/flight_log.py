@@ -50,6 +50,8 @@ class FlightLog:
         self._data = mujoco.MjData(self._model)
         self._every = scenario.log.every(scenario.rates.control)
         self._first = first.period
+        self._last_frame: tuple[np.ndarray, np.ndarray] | None = None
+        """Time (1,) [s] and state (1, nstate) of the last period, unless its frames are logged."""
         compiled, drawn = described(self._model)
         attachments = {
             "model.mjb.gz": ("application/gzip", compiled),
@@ -79,7 +81,12 @@ class FlightLog:
         """
         rows = one_vehicle(block)
         # What goes into a chunk beside the periods must be handed over before them.
-        self._write_frames(block, rows["/state"]["physics"])
+        physics = rows["/state"]["physics"]
+        sequence = block.period - self._first + np.arange(len(block.time))
+        chosen = due(self._first, sequence, self._every["/tf"])
+        self._write_frames(block.time[chosen], physics[chosen])
+        logged = sequence[-1] in sequence[chosen]
+        self._last_frame = None if logged else (block.time[-1:], physics[-1:].copy())
         for time, _, level, text in block.events:
             self._log.event(time, level, text)
         self._log.write(block.time, rows)
@@ -92,12 +99,14 @@ class FlightLog:
         return self
 
     def __exit__(self, *_: Any) -> None:
-        self._log.close()
+        try:
+            if self._last_frame is not None:
+                self._write_frames(*self._last_frame)
+        finally:
+            self._log.close()
 
-    def _write_frames(self, block: Block, physics: np.ndarray) -> None:
-        sequence = block.period - self._first + np.arange(len(block.time))
-        chosen = due(self._first, sequence, self._every["/tf"])
-        time, states = block.time[chosen], physics[chosen]
+    def _write_frames(self, time: np.ndarray, states: np.ndarray) -> None:
+        """Log the bodies' frames at ``time`` (n,) [s], of MuJoCo's ``states`` (n, nstate)."""
         positions = np.empty((len(time), self._model.nbody - 1, 3))
         quaternions = np.empty((len(time), self._model.nbody - 1, 4))
         for i, state in enumerate(states):

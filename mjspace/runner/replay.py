@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mjspace.contract import REPORTED_BY_PLANT, TICK, Array
-from mjspace.errors import InputError, input_error_at
+from mjspace.errors import InputError, failure, input_error_at
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.runner.former_names import as_logged, logged_name
@@ -196,7 +196,8 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     """Return the logged period nearest ``time`` [s] as a start; ``fresh_law`` resets the law there.
 
     Raises:
-        InputError: the log does not hold that time, or not this law's state.
+        InputError: the log does not hold that time, or not this law's state; the law's ``reset``
+            raised, with the line of the user's code.
     """
     period = assembly.scenario.rates.control
     number = round(time / period)
@@ -223,10 +224,13 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
         logged = log.nearest("/measurement", time)
         measured = {name: values[None] for name, values in logged.items() if name != "time"}
         desired = reference_at(assembly.reference, np.array([number * period]))
-        template = assembly.law.reset(
-            assembly.sensors([0]).measurement(**absent | measured),
-            type(desired)(*(values[0] for values in desired)),
-        )
+        measurement = assembly.sensors([0]).measurement(**absent | measured)
+        try:
+            template = assembly.law.reset(
+                measurement, type(desired)(*(values[0] for values in desired))
+            )
+        except Exception as error:
+            raise InputError(f"log: {failure('the law', error)}") from error
         fields = getattr(template, "_fields", ())
         names = [logged_name(f"law_{field}", state) for field in fields]
         missing = [field for field, name in zip(fields, names, strict=True) if name not in state]

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from mjspace.errors import FlightError
 from mjspace.log.reader import Log
-from mjspace.runner.checks import Verdict, refuse_unknown
+from mjspace.runner.checks import Verdict, refuse_other_dimensions, refuse_unknown
+from mjspace.runner.flight_log import units_of
 from mjspace.runner.interrupts import on_signals
 from mjspace.runner.recorder import Recorder
 from mjspace.scenario.loading import load
@@ -86,7 +87,8 @@ def fly_to_log(
     """Fly one member of the scenario, from ``start`` or time zero, into a new log, and judge it.
 
     Raises:
-        InputError: a check of the scenario names no signal of this flight; nothing is written.
+        InputError: a check of the scenario names no signal of this flight, or has a bound of
+            another dimension; nothing is written.
         FlightError: it could not even begin.
         OSError: the log cannot be written (any more); it keeps what it has.
     """
@@ -95,7 +97,10 @@ def fly_to_log(
     with on_signals() as stop, Recorder(assembly) as recorder:
         blocks = fly(assembly, start, [member], stop=stop)
         first = next(blocks)
-        refuse_unknown(assembly.scenario.checks, shapes(first))
+        checks, topics = assembly.scenario.checks, shapes(first)
+        refuse_unknown(checks, topics)
+        units = units_of(assembly, first.kinds)
+        refuse_other_dimensions(checks, assembly.scenario.events, topics, units)
         path.parent.mkdir(parents=True, exist_ok=True)
         recorder.begin(path, member, first)
         try:

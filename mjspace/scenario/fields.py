@@ -18,7 +18,7 @@ from pydantic import (
 from pydantic_core import core_schema
 
 from mjspace.ranges import FORMS, Form
-from mjspace.units import Unit, to_si
+from mjspace.units import Unit, quantity, to_si
 
 _IN_PEOPLES_UNITS = {"rad": "deg", "rad/s": "deg/s", "m": "km", "s": "min"}
 
@@ -60,11 +60,10 @@ class Interval(Si):
     """A period [s]; a frequency does too: ``"100 Hz"`` is 0.01 s."""
 
     def _validated(self, value: Any, inner: core_schema.ValidatorFunctionWrapHandler) -> Any:
-        if isinstance(value, str) and value.endswith("Hz"):
-            frequency = to_si(value, "Hz")
-            if frequency <= 0.0:
+        if isinstance(value, str) and (found := quantity(value, "s", "Hz")).unit == "Hz":
+            if found <= 0.0:
                 raise ValueError(f"got {value!r}, should be greater than 0")
-            value = 1.0 / frequency
+            value = 1.0 / found
         return super()._validated(value, inner)
 
 

@@ -4,11 +4,11 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import field_validator, model_validator
+from pydantic import ValidatorFunctionWrapHandler, field_validator, model_validator
 
 from mjspace.contract import Array
 from mjspace.scenario.fields import Finite, Table
-from mjspace.units import to_si
+from mjspace.units import Quantity, to_si
 
 
 class Region(Table):
@@ -22,10 +22,12 @@ class Region(Table):
     above: Finite | None = None
     """It must be greater; a number in SI or a quantity."""
 
-    @field_validator("below", "above", mode="before")
+    @field_validator("below", "above", mode="wrap")
     @classmethod
-    def _quantity(cls, value: Any) -> Any:
-        return to_si(value, None)
+    def _quantity(cls, value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
+        found = to_si(value, None)
+        number = validated(found)
+        return found if isinstance(found, Quantity) else number  # the flight knows the signal's
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:

@@ -9,6 +9,7 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
     field_validator,
     model_validator,
 )
@@ -22,7 +23,7 @@ from mjspace.scenario.log_rates import LogRates
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
 from mjspace.scenario.sensors import Sensors, check_sensors
-from mjspace.units import to_si, whole_number
+from mjspace.units import Quantity, to_si, whole_number
 
 
 class Component(BaseModel):
@@ -108,16 +109,18 @@ class Check(SignalRegion):
             raise ValueError('because goes with expected = "FAIL"')
         return self
 
-    @field_validator("target", mode="before")
+    @field_validator("target", mode="wrap")
     @classmethod
-    def _numbers(cls, value: Any) -> Any:
+    def _numbers(cls, value: Any, _: ValidatorFunctionWrapHandler) -> Any:
         if value is None:
             return None
-        items = value if isinstance(value, list | tuple) else [value]
-        found = numbers(to_si(items, None))
+        several = isinstance(value, list | tuple)
+        items = to_si(value if several else [value], None)
+        found = numbers(items)
         if found.ndim != 1 or not len(found) or not np.isfinite(found).all():
             raise ValueError(f"got {value!r}, should be a finite number or a list of them")
-        return found.tolist() if isinstance(value, list | tuple) else float(found[0])
+        kept = [each if isinstance(each, Quantity) else float(each) for each in items]
+        return kept if several else kept[0]
 
     @model_validator(mode="after")
     def _of_an_error(self) -> Self:

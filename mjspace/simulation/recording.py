@@ -20,7 +20,11 @@ Rows = dict[str, dict[str, Array]]
 
 @dataclass(frozen=True)
 class Block:
-    """Consecutive control periods: ``rows[topic][field]`` is (n, N, ...), ``time`` (n,) [s]."""
+    """Consecutive control periods: ``rows[topic][field]`` is (n, N, ...), ``time`` (n,) [s].
+
+    Its arrays are read after it has been yielded, on the log's thread, while the flight goes on:
+    they must not be written again. Each block has buffers of its own.
+    """
 
     period: int
     """Of the first row."""

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from log_samples import fly
+from log_samples import fly, rewritten
 
 from mjspace import cli
 from mjspace.log.index import inventory
+from mjspace.runner.run import run
 
 COMMANDS = {
     "info": (),
@@ -103,6 +104,24 @@ def test_no_command_has_a_traceback_of_a_log_cut_anywhere(command: Command, whol
             status, said = command(name, "cut.mcap", *rest)
             assert status in (0, 2)
             assert said.count("\n") == (status == 2), said
+
+
+def test_a_law_that_raises_in_its_reset_is_one_line_with_its_place(
+    command: Command, failing_law: Callable[[float], None]
+) -> None:
+    """As where it refuses what is measured in the middle of a flight."""
+    failing_law(1.0)
+    Path("x.toml").write_text(
+        'base = "detumble-wheels"\nduration = 0.05\nchecks = []\n[law]\nkind = "law.py:Law"\n'
+    )
+    log = run("x.toml", out="flown").path
+    law = Path("law.py").read_text().replace("return None\n", 'raise ArithmeticError("no")\n', 1)
+    rewritten(log, Path("x.mcap"), attachments={"law.py": law.encode()})
+    for rest in (("--verify",), ("--out", "out", "--from", "0.02")):
+        status, said = command("replay", "x.mcap", *rest)
+        assert status == 2
+        assert said == "mjspace: log: the law raised ArithmeticError at law.py:10: no\n"
+    assert not os.path.exists("out")
 
 
 @pytest.mark.parametrize(

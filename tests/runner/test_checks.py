@@ -8,9 +8,10 @@ import pytest
 from pydantic import ValidationError
 
 from mjspace.errors import InputError
-from mjspace.runner.checks import Judge, Verdict, refuse_unknown
+from mjspace.runner.checks import Judge, Verdict, refuse_other_dimensions, refuse_unknown
 from mjspace.scenario.scenario import Check, EventTable
 from mjspace.signals import find_signal
+from mjspace.units import Unit
 
 
 class Recording(NamedTuple):
@@ -196,6 +197,47 @@ def test_a_target_of_the_wrong_length_is_refused() -> None:
     check = Check(name="x", signal="truth.rate", below=1, target=[1, 2])
     with pytest.raises(InputError, match=r"checks\.0\.target: 2 numbers, truth\.rate has 3"):
         refuse_unknown([check], TOPICS)
+
+
+UNITS = {"/truth": {"rate": Unit("rad/s")}}
+
+
+def refuse(units: dict[str, dict[str, Unit]] = UNITS, event: bool = False, **keys: Any) -> None:
+    """Refuse a check, or an event, of the rate if it has another dimension."""
+    table = {"name": "x", "signal": "truth.rate"} | keys
+    checks = [] if event else [Check.model_validate(table)]
+    events = [EventTable.model_validate(table)] if event else []
+    refuse_other_dimensions(checks, events, TOPICS, units)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (
+            {"below": "3 m"},
+            r"^checks\.0\.below: got 3 m for truth\.rate, should be in rad/s$",
+        ),
+        ({"above": "90 deg"}, r"checks\.0\.above: got 1\.5708 rad for .*, should be in rad/s"),
+        ({"below": 1, "target": [1, "2 s", 3]}, r"checks\.0\.target: got 2 s .* in rad/s"),
+        ({"below": 1, "target": "2 s"}, r"checks\.0\.target: got 2 s .* in rad/s"),
+        (
+            {"below": "1 rad/s", "target": "2 deg/s", "relative": True},
+            r"below: got 1 rad/s .* a plain number, of a relative error",
+        ),
+        ({"below": "3 m", "event": True}, r"events\.0\.below: got 3 m .* in rad/s"),
+    ],
+)
+def test_bounds_of_another_dimension_are_refused(keys: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        refuse(**keys)
+
+
+def test_bounds_of_the_signals_dimension_are_taken() -> None:
+    refuse(below="3 deg/s", above="-1 rpm", target=["1 rad/s", 0, 0])
+    refuse(below=3, target=1)
+    refuse(below=0.1, target="2 rad/s", relative=True)
+    refuse(below="3 deg/s", event=True)
+    refuse({"/truth": {}}, below="3 m")  # of what has no unit, it may be anything
 
 
 SMALL = EventTable(name="small", signal="truth.error", below=1.5, above=0.0)  # first at 0.3 s

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from log_samples import rewritten
 from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.contract import Array
 from mjspace.errors import InputError
@@ -88,12 +89,17 @@ def test_other_readers_find_them_by_time(slower: Log) -> None:
 
 
 def test_frames_are_as_frequent_as_the_default_unless_they_have_a_rate(tmp_path: Path) -> None:
+    """And they have the flight's last instant."""
     for rate, stamps in (("50 Hz", range(0, 112, 20)), ("1 kHz", range(0, 112, 10))):
         overrides = [*SHORT, f"log.default='{rate}'"]
         log = run("contraction-adaptive", overrides=overrides, out=tmp_path / rate).log
         with log.path.open("rb") as file:
-            found = [m.log_time for *_, m in make_reader(file).iter_messages(["/tf"])]
-        assert found == [1_000_000 * k for k in stamps]
+            reader = make_reader(file, decoder_factories=[DecoderFactory()])
+            *_, (_, _, _, last) = frames = list(reader.iter_decoded_messages(["/tf"]))
+        bus = next(each.rotation for each in last.transforms if each.child_frame_id == "bus")
+        attitude = log.read("/truth", ["attitude"])["attitude"][-1]
+        assert [bus.w, bus.x, bus.y, bus.z] == pytest.approx(attitude, rel=1e-14)
+        assert [frame[2].log_time for frame in frames] == [1_000_000 * k for k in (*stamps, 111)]
 
 
 @pytest.mark.parametrize("start", [0.0, 0.02, 0.1, 0.111])
@@ -203,7 +209,8 @@ def test_a_flight_that_breaks_off_has_its_last_row_on_each_topic(
         ("log.state='2.5 ms'", r"log\.state: 0\.0025 s is not a whole number of rates\.control"),
         ("log.default='300 Hz'", r"log\.default: 0\.003333333333 s .* 0\.003 s and 0\.004 s"),
         ("log.tf='0 Hz'", r"log\.tf: got '0 Hz', should be greater than 0"),
-        ("log.law='5 m'", r"log\.law: '5 m' has the unit 'm'"),
+        ("log.law='5 m'", r"log\.law: '5 m' has the unit 'm', should be one of s, .*, Hz, kHz"),
+        ("log.law='5'", r"log\.law: '5' has no unit: write a plain number for s, or .* Hz, kHz"),
         ("log.stat='1 s'", r"log\.stat: no such key: did you mean 'state'\?"),
     ],
 )

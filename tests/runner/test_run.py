@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mjspace.errors import InputError
 from mjspace.runner.run import output_folder, run
 from mjspace.simulation import loop
 from mjspace.simulation.loop import fly
@@ -92,3 +93,23 @@ def test_a_run_without_a_folder_has_one_of_its_own() -> None:
 def test_a_log_knows_whose_flight_it_is(tmp_path: Path) -> None:
     result = run("detumble-wheels", overrides=["duration=0.01", "checks=[]"], out=tmp_path)
     assert result.log.metadata["member"] == "0"
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("checks.0.below='3 m'", r"checks\.0\.below: got 3 m for truth\.rate\[0\], .* rad/s"),
+        (
+            "checks.1.signal='law.angle'",
+            r"checks\.1\.below: got 0\.1 rad/s for law\.angle, .* rad$",
+        ),
+    ],
+)
+def test_a_bound_of_another_dimension_is_refused_before_anything_is_written(
+    override: str, message: str, tmp_path: Path
+) -> None:
+    """Also where the law itself declares the signal's unit."""
+    checks = SHORT[1].replace("below=0.1", "below='0.1 rad/s'")
+    with pytest.raises(InputError, match=message):
+        run("rcs-schmitt", overrides=[SHORT[0], checks, override], out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
