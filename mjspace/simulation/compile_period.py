@@ -47,8 +47,8 @@ def compile_period(
                 return tracing.of_command(example.command)
             with refusing_hidden_memory(tracing.law) as tracing.law:
                 return tracing.with_law()
-    except FlightError as error:
-        # Says which actuator, and where.
+    except (FlightError, TypeError, ValueError) as error:
+        # Says which actuator, and where; or what a law returned has other fields than before.
         raise Untraceable(str(error)) from error
 
 
