@@ -14,7 +14,7 @@ __version__ = "0.1.0"
 _MODULES = {
     "Log": "mjspace.log.reader",
     "figure": "mjspace.plotting.page",
-    "list_scenarios": "mjspace.scenario.loading",
+    "list_scenarios": "mjspace.scenario.files",
     "load": "mjspace.scenario.loading",
     "plot": "mjspace.plotting.page",
     "render": "mjspace.rendering.render",

@@ -1,7 +1,7 @@
 """Logged signals by name: ``truth.rate[0]`` is a topic, its field and some of its components."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -35,6 +35,14 @@ def find_signal(topics: Topics, signal: str) -> tuple[str, str, slice]:
     if not start < end <= size:
         raise ValueError(f"signal {signal!r}: {topic[1:]}.{field} has {size} components")
     return topic, field, slice(start, end)
+
+
+def by_topic(fields: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """Return ``fields``, each with its topic before it, as the fields of each topic."""
+    found: dict[str, list[str]] = {}
+    for topic, field in fields:
+        found.setdefault(topic, []).append(field)
+    return found
 
 
 def magnitude(rows: Array) -> Array:

@@ -24,6 +24,7 @@ A_LAW_MAY_IMPORT = (
 ROOMS = {
     "constants": "",
     "errors": "",
+    "gufunc": "",
     "ranges": "",
     "units": "",
     "scenarios": "",
@@ -33,8 +34,10 @@ ROOMS = {
     "scenario": "contract errors ranges units",
     "vehicle": "contract errors scenario",
     "environment": "constants contract scenario vehicle",
-    "sensors": "attitude contract scenario units",
-    "actuators": "constants contract environment errors scenario sensors signals units vehicle",
+    "sensors": "attitude contract gufunc scenario units",
+    "actuators": (
+        "constants contract environment errors gufunc scenario sensors signals units vehicle"
+    ),
     "log": "attitude contract scenario units",
     "plotting": "contract log scenario signals units",
     "rendering": "attitude contract environment errors log vehicle",

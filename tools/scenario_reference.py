@@ -1,10 +1,13 @@
 """Write docs/scenario.md from the typed scenario, so that the page cannot say anything else."""
 
+import ast
+import inspect
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
 from datetime import datetime
+from functools import cache
 from importlib import import_module
-from inspect import isabstract
+from itertools import pairwise
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -59,8 +62,26 @@ def page() -> str:
 def _described(table: type[BaseModel], key: str) -> str:
     """Return the key's description, which a class may leave to the one that it is based on."""
     bases = [base for base in table.__mro__ if issubclass(base, BaseModel)]
-    found = [base.model_fields[key] for base in bases if key in base.model_fields]
-    return next((field.description for field in found if field.description), "")
+    stated = table.model_fields[key].description
+    return stated or next((text for base in bases if (text := _docstrings(base).get(key))), "")
+
+
+@cache
+def _docstrings(table: type[BaseModel]) -> dict[str, str]:
+    """Return the string below each field of the class, by the field's name.
+
+    Pydantic reads them too, but at every start of mjspace, which takes 0.3 s.
+    """
+    tree = ast.parse(inspect.getsource(inspect.getmodule(table)))
+    classes = {node.name: node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+    if table.__name__ not in classes:  # a generic one with its parameters
+        return {}
+    found = {}
+    for field, below in pairwise(classes[table.__name__].body):
+        match field, below:
+            case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(text))):
+                found[name] = inspect.cleandoc(text)
+    return found
 
 
 def _laws() -> list[str]:
@@ -72,7 +93,7 @@ def _laws() -> list[str]:
         for name, kind in vars(module).items():
             flies = hasattr(kind, "batched") or hasattr(kind, "at")
             own = is_dataclass(kind) and kind.__module__ == module.__name__
-            if own and flies and not isabstract(kind):
+            if own and flies and not inspect.isabstract(kind):
                 gains = [_gain(f) for f in fields(kind)]
                 lines.append(f"| `{short}:{name}` | {', '.join(gains)} |")
     closing = """

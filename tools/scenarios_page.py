@@ -8,7 +8,8 @@ from importlib import import_module
 from pathlib import Path
 
 from mjspace.scenario.construct import controllers
-from mjspace.scenario.loading import load, scenario_names
+from mjspace.scenario.files import scenario_names
+from mjspace.scenario.loading import load
 
 PAGE = Path(__file__).parents[1] / "docs/scenarios.md"
 HEAD = """# What flies

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numba import guvectorize
 from pydantic import Field
 
 from mjspace.actuators import tank as tanks
@@ -27,6 +26,7 @@ from mjspace.actuators.base import Actuator, Context, Fields, Input, State, moto
 from mjspace.actuators.thruster_layout import ThrusterTable, names
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
+from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import Positive, Seconds, Si
 
 
@@ -146,10 +146,9 @@ class ColdGasThrusters(Actuator):
         return state | {"cold_gas": np.maximum(left - spent, 0.0)}, instead
 
 
-@guvectorize(
+@gufunc(
     ["void(f8[:],f8[:],f8[:],f8[:],f8,f8[:],f8[:],f8[:],f8[:])"],
     "(n),(o),(o),(d),()->(o),(o),(n),(n)",
-    cache=True,
 )
 def _blow_down(
     on_time: Any,

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numba import guvectorize
 from pydantic import Field, model_validator
 
 from mjspace.actuators import tank as tanks
@@ -20,6 +19,7 @@ from mjspace.actuators.base import (
 )
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import TICK, Array, Measurement
+from mjspace.gufunc import gufunc
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import NonNegative, Positive, Seconds, Si, Table, Time
 
@@ -179,10 +179,9 @@ class GimballedEngine(Actuator):
         return tanks.masses(self.tank, self.full, before["propellant"], after["propellant"])
 
 
-@guvectorize(
+@gufunc(
     ["void(f8[:],f8[:],f8[:],f8[:],f8[:],f8,f8[:],f8[:],f8[:])"],
     "(s),(c),(g),(g),(d),()->(s),(c),(c)",
-    cache=True,
 )
 def _engine(
     state: Any,

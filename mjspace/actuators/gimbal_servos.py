@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numba import guvectorize
 
 from mjspace.actuators.base import (
     ActuatorTable,
@@ -14,6 +13,7 @@ from mjspace.actuators.base import (
 )
 from mjspace.actuators.driven_hinges import HingeMotors, gimbals_and_wheels
 from mjspace.contract import Array, Measurement
+from mjspace.gufunc import gufunc
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import Finite, NonNegative, Positive, Si, Table
 from mjspace.vehicle import indices
@@ -110,10 +110,9 @@ class GimbalServos(HingeMotors):
         return {"servo_integral": integral}, *in_order
 
 
-@guvectorize(
+@gufunc(
     ["void(f8[:],f8[:],f8[:],f8[:,:],f8,f8[:],f8[:],f8[:])"],
     "(m),(m),(m),(m,d),()->(m),(m),(m)",
-    cache=True,
 )
 def _hold_speed(
     before: Any,

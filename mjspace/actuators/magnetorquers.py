@@ -5,7 +5,6 @@ from math import exp, inf
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numba import guvectorize
 from pydantic import Field
 
 from mjspace.actuators.base import (
@@ -18,6 +17,7 @@ from mjspace.actuators.base import (
     State,
 )
 from mjspace.contract import Array, Measurement
+from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import Positive, Si, Table, Time, Unit3
 
 
@@ -95,10 +95,9 @@ class CoilSet(Actuator):
 
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
-@guvectorize(
+@gufunc(
     ["void(f8[:], f8[:], f8[:, :], f8[:, :], f8[:], f8[:], f8[:])"],
     "(k),(n),(n,k),(n,k),(m)->(n),(k)",
-    cache=True,
 )
 def _moments(
     commanded: Any, before: Any, allocation: Any, axes: Any, how: Any, after: Any, moment: Any

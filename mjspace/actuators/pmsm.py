@@ -17,11 +17,12 @@ from functools import cached_property
 from math import inf
 from typing import Annotated, Any, Literal
 
-import numba
 import numpy as np
 from pydantic import Field
 
 from mjspace.contract import Array
+from mjspace.environment.compiled import compiled
+from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import Positive, Si, Table
 
 
@@ -117,7 +118,7 @@ class Drives:
 
 # With f(x) = (e^x - 1 - x)/x^2, the answers of i' = a i + b after h are, x = a h,
 # mean i = i0 + h (a i0 + b) f(x) and i(h) = i0 + h (a (mean i) + b).
-@numba.njit
+@compiled
 def _held_ramp(x: Any) -> Any:
     """Return (e^x - 1 - x)/x^2, by its series where the difference would lose digits."""
     if abs(x) > 1.0:
@@ -128,7 +129,7 @@ def _held_ramp(x: Any) -> Any:
     return 0.5 * total
 
 
-@numba.njit
+@compiled
 def _from_rest(a: Any, v: Any, w: Any, step: Any) -> tuple[Any, Any]:
     """Return (mean, end) of i' = a i + v e^(-j w t), i(0) = 0: ``v`` turns back at ``w`` [rad/s].
 
@@ -141,10 +142,9 @@ def _from_rest(a: Any, v: Any, w: Any, step: Any) -> tuple[Any, Any]:
     return (end / step - v * middle * share) / a, end
 
 
-@numba.guvectorize(
+@gufunc(
     ["void(f8[:, :], f8[:, :], f8[:], f8[:], f8[:, :], f8, f8[:, :], f8[:], f8[:, :])"],
     "(m,k),(m,k),(m),(m),(c,m),()->(m,k),(m),(m,k)",
-    cache=True,
 )
 def _advance(
     current: Any, voltage: Any, speed: Any, angle: Any, constants: Any, step: Any,

@@ -6,7 +6,6 @@ from math import inf
 from typing import Annotated, Any, ClassVar, Literal
 
 import mujoco
-import numba
 import numpy as np
 from pydantic import model_validator
 
@@ -20,6 +19,7 @@ from mjspace.actuators.base import (
     motors,
 )
 from mjspace.contract import Array, Measurement
+from mjspace.gufunc import gufunc
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import Meters3, Positive, Si, Unit3
 from mjspace.scenario.hinges import Bearing, Friction
@@ -285,10 +285,9 @@ class ReactionWheels(Actuator):
 
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
-@numba.guvectorize(
+@gufunc(
     ["void(f8[:], f8[:], f8[:, :], f8[:], f8[:], f8[:], f8[:, :], f8, f8[:], f8[:])"],
     "(k),(n),(n,k),(n),(m),(n),(u,k),()->(n),(n)",
-    cache=True,
 )
 def _motor_torque(
     torque: Any,

@@ -5,7 +5,6 @@ from math import ceil
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numba import guvectorize
 from pydantic import model_validator
 
 from mjspace.actuators import tank as tanks
@@ -20,6 +19,7 @@ from mjspace.actuators.base import (
 from mjspace.actuators.thruster_layout import ThrusterTable, names
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
+from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import Positive, Seconds, Si, Time
 
 FIELDS = ("rcs_thrust", "rcs_open", "rcs_on_time", "rcs_asked", "rcs_step", "rcs_propellant")
@@ -175,13 +175,12 @@ class Thrusters(Actuator):
         return tanks.masses(self.tank, self.full, *propellant)
 
 
-@guvectorize(
+@gufunc(
     [
         "void(f8[:],f8[:],f8[:],f8[:,:],f8[:],f8[:],f8[:],f8[:],f8,"
         "f8[:],f8[:],f8[:],f8[:,:],f8[:],f8[:],f8[:],f8[:])"
     ],
     "(n),(n),(n),(n,k),(o),(o),(n),(d),()->(n),(n),(n),(n,k),(o),(o),(n),(n)",
-    cache=True,
 )
 def _pulse(
     thrust: Any,

@@ -54,7 +54,7 @@ def run(
 
 def _run_all(overrides: list[str], out: Path, as_json: bool) -> NoReturn:
     from mjspace.runner import run_all
-    from mjspace.scenario.loading import scenario_names
+    from mjspace.scenario.files import scenario_names
 
     with progress_bar(1.0, "flying", count="") as progress:
         outcomes = run_all.fly(scenario_names(), overrides, out, progress)

@@ -12,9 +12,9 @@ from mjspace.terminal.reporting import open_log
 
 def list_scenarios(as_json: Json = False) -> None:
     """List the scenarios that come with mjspace."""
-    from mjspace.scenario import loading
+    from mjspace.scenario import files
 
-    found = loading.list_scenarios()
+    found = files.list_scenarios()
     if as_json:
         print(json.dumps(found, indent=2))
         return

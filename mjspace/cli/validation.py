@@ -6,7 +6,6 @@ from typing import Annotated, NoReturn
 import typer
 
 from mjspace.errors import InputError, input_error_at
-from mjspace.runner import workers
 from mjspace.terminal.options import Json
 from mjspace.terminal.reporting import progress_bar
 
@@ -40,6 +39,8 @@ def validate(
                 "--model: a passport is of one model: leave --only, --quick and --basilisk out"
             )
         _examine(model, out, as_json)
+
+    from mjspace.runner import workers
 
     workers.warm_up("mjspace.validation.benchmarks")
     from mjspace.runner.run import output_folder

@@ -16,7 +16,8 @@ from mjspace.log.encoding import HEADER
 RECORD = "mjspace.sha256"
 """Name of the metadata record that holds the digests, by topic."""
 
-_FROM = HEADER.fields["log_time"][1]  # type: ignore[index]
+FROM: int = HEADER.fields["log_time"][1]  # type: ignore[index]
+"""The first byte of a message record that counts."""
 
 
 class RowDigests:
@@ -29,12 +30,12 @@ class RowDigests:
         """Add a block of message records, whose fields are the topics."""
         content = records.view(np.uint8).reshape(len(records), records.itemsize)
         for topic, (dtype, start, *_) in (records.dtype.fields or {}).items():
-            part = content[:, start + _FROM : start + dtype.itemsize]
+            part = content[:, start + FROM : start + dtype.itemsize]
             self._hashes[topic].update(np.ascontiguousarray(part).data)
 
-    def add_messages(self, topic: str, records: Iterable[bytes]) -> None:
-        """Add whole message records of one topic."""
-        self._hashes[topic].update(b"".join(record[_FROM:] for record in records))
+    def add_messages(self, topic: str, tails: bytes) -> None:
+        """Add message records of one topic, each without the bytes before ``FROM``."""
+        self._hashes[topic].update(tails)
 
     def by_topic(self) -> dict[str, str]:
         """Return the digests so far, in hexadecimal."""

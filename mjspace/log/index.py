@@ -2,24 +2,21 @@
 
 import io
 import struct
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from struct import Struct
 from typing import BinaryIO, NamedTuple
 
-import numpy as np
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Metadata, Schema
+from mcap.records import Attachment, Channel, Metadata, Schema
 
-from mjspace.log.chunk import INDEX
-from mjspace.log.digest import RECORD
+from mjspace.log import digest
 from mjspace.log.file import MAGIC, NAME
 
-_RECORD = Struct("<BQ")  # opcode, length of the content that follows
-_MESSAGE = Struct("<BQH")  # the same, and a message's channel
+RECORD = Struct("<BQ")
+"""What a record begins with: opcode, length of the content that follows."""
 
 
 class ChunkPlace(NamedTuple):
@@ -85,7 +82,7 @@ def _inventory(path: Path) -> Inventory:
                 if note.name == NAME:
                     found.metadata.update(note.metadata)
                     ours = True
-                elif note.name == RECORD:
+                elif note.name == digest.RECORD:
                     found.digests.update(note.metadata)
             elif opcode == Opcode.DATA_END:
                 file.seek(-len(MAGIC), io.SEEK_END)
@@ -105,44 +102,6 @@ def read_attachment(path: Path, position: int) -> bytes:
         return attached.data
 
 
-def read_messages(
-    file: BinaryIO, place: ChunkPlace, channels: Collection[int]
-) -> dict[int, list[bytes]]:
-    """Return a chunk's Message records on each of ``channels`` that it has, each record whole.
-
-    Raises:
-        ValueError: the chunk is damaged, or compressed by another method than zstd.
-    """
-    if place.indexes is not None:
-        channels = [channel for channel in channels if channel in place.indexes]
-        if not channels:
-            return {}
-    file.seek(place.position)
-    chunk = Chunk.read(ReadDataStream(file))
-    if chunk.compression not in ("", "zstd"):
-        raise ValueError(f"compression {chunk.compression!r}: write the log anew with zstd")
-    data = chunk.data
-    if chunk.compression:
-        try:
-            data = zstandard.decompress(data, max_output_size=chunk.uncompressed_size)
-        except zstandard.ZstdError as error:
-            raise ValueError(f"the chunk at byte {place.position} is damaged: {error}") from None
-    offsets: dict[int, list[int]] = {channel: [] for channel in channels}
-    if place.indexes is None:
-        for offset, number in _messages(data):
-            if number in offsets:
-                offsets[number].append(offset)
-    else:
-        for channel in channels:
-            file.seek(place.indexes[channel] + 2)
-            size = int.from_bytes(file.read(4), "little")
-            offsets[channel] = np.frombuffer(file.read(size), INDEX)["offset"].tolist()
-    return {
-        channel: [data[at : at + 9 + _RECORD.unpack_from(data, at)[1]] for at in places]
-        for channel, places in offsets.items()
-    }
-
-
 def _walk(file: BinaryIO) -> Iterator[tuple[int, int]]:
     """Yield the opcode of each whole record, and where its content is, with the file put there."""
     # The summary too: other writers put schemas and channels into chunks, and again only there.
@@ -150,22 +109,12 @@ def _walk(file: BinaryIO) -> Iterator[tuple[int, int]]:
     position = len(MAGIC)
     while True:
         file.seek(position)
-        head = file.read(_RECORD.size)
-        if len(head) < _RECORD.size:
+        head = file.read(RECORD.size)
+        if len(head) < RECORD.size:
             return
-        opcode, length = _RECORD.unpack(head)
-        position += _RECORD.size
+        opcode, length = RECORD.unpack(head)
+        position += RECORD.size
         if position + length > size:
             return
         yield opcode, position
         position += length
-
-
-def _messages(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yield where each message of a chunk's content is, and its channel."""
-    at = 0
-    while at < len(data):
-        opcode, length, channel = _MESSAGE.unpack_from(data, at)
-        if opcode == Opcode.MESSAGE:
-            yield at, channel
-        at += _RECORD.size + length

@@ -1,9 +1,8 @@
 """Reading a log: NumPy arrays by topic and field, one chunk in memory at a time."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,10 @@ from foxglove_schemas_protobuf.Log_pb2 import Log as LogMessage
 from numpy.typing import NDArray
 
 from mjspace.contract import Array, Event
-from mjspace.log.digest import RowDigests
+from mjspace.log import digest
+from mjspace.log.content import Content, read_content
 from mjspace.log.encoding import HEADER, doubles
-from mjspace.log.index import ChunkPlace, inventory, read_attachment, read_messages
+from mjspace.log.index import ChunkPlace, inventory, read_attachment
 from mjspace.log.schema import PERIODIC, field_names
 
 
@@ -108,17 +108,39 @@ class Log:
         Raises:
             ValueError: the log has no such topic or field, or a chunk is damaged.
         """
-        names = self._fields(topic, fields)
+        for found in self.blocks_of_topics({topic: fields}, start, end, every):
+            yield found[topic]
+
+    def blocks_of_topics(
+        self,
+        fields: Mapping[str, Sequence[str] | None],
+        start: float | None = None,
+        end: float | None = None,
+        every: int = 1,
+    ) -> Iterator[dict[str, dict[str, Array]]]:
+        """Yield the ``blocks`` of several periodic topics side by side: each chunk is read once.
+
+        ``fields`` are by topic, None for all of it. A chunk without rows of a topic lacks it.
+
+        Raises:
+            ValueError: the log has no such topic or field, or a chunk is damaged.
+        """
+        names = {topic: self._fields(topic, chosen) for topic, chosen in fields.items()}
         first = 0 if start is None else max(round(start * 1e9), 0)
         stop = 2**63 if end is None else max(round(end * 1e9) + 1, 0)
         places = [c for c in self._found.chunks if c.end >= first and c.start < stop]
-        skip = 0
-        for rows in self._rows(topic, places):
-            stamps = rows["header"]["log_time"]
-            low, high = np.searchsorted(stamps, np.array([first, stop], np.uint64))
-            if low + skip < high:
-                yield _columns(rows[low + skip : high : every], names)
-            skip = (skip - (high - low)) % every
+        skip = dict.fromkeys(names, 0)
+        for content in self._rows(names, places):
+            found = {}
+            for topic, rows in content.items():
+                stamps = rows["header"]["log_time"]
+                low, high = np.searchsorted(stamps, np.array([first, stop], np.uint64))
+                if low + skip[topic] < high:
+                    chosen = rows[low + skip[topic] : high : every]
+                    found[topic] = _columns(chosen, names[topic])
+                skip[topic] = (skip[topic] - (high - low)) % every
+            if found:
+                yield found
 
     def read(
         self,
@@ -129,11 +151,20 @@ class Log:
         every: int = 1,
     ) -> dict[str, Array]:
         """Return the ``blocks`` of a topic as one: see there."""
-        blocks = list(self.blocks(topic, fields, start, end, every))
-        shapes = {"time": ()} | self.topics[topic]
+        return self.read_topics({topic: fields}, start, end, every)[topic]
+
+    def read_topics(
+        self,
+        fields: Mapping[str, Sequence[str] | None],
+        start: float | None = None,
+        end: float | None = None,
+        every: int = 1,
+    ) -> dict[str, dict[str, Array]]:
+        """Return the ``blocks_of_topics`` as one: see there."""
+        blocks = list(self.blocks_of_topics(fields, start, end, every))
         return {
-            name: np.concatenate([np.empty((0, *shapes[name])), *(block[name] for block in blocks)])
-            for name in ("time", *self._fields(topic, fields))
+            topic: self._joined(topic, chosen, [block[topic] for block in blocks if topic in block])
+            for topic, chosen in fields.items()
         }
 
     def nearest(self, topic: str, time: float) -> dict[str, Array]:
@@ -147,7 +178,7 @@ class Log:
         # The rows on either side are in the last chunk that starts before ``time``, the one before
         # it (an /events or /tf stamp may be all that starts it so early) or the one after it.
         after = bisect_right(places, stamp, key=lambda place: place.start)
-        found = list(self._rows(topic, places[max(after - 2, 0) : after + 1]))
+        found = [rows[topic] for rows in self._rows([topic], places[max(after - 2, 0) : after + 1])]
         if not found:
             raise ValueError(f"{self.path} holds nothing on {topic} near {time:g} s")
         rows = np.concatenate(found)
@@ -164,29 +195,32 @@ class Log:
         """
         if not (self.complete and self._found.digests):
             return None
-        found = RowDigests(self.topics)
-        for messages in self._messages(self.topics, self._found.chunks):
-            for topic, records in messages.items():
-                found.add_messages(topic, records)
+        found = digest.RowDigests(self.topics)
+        topics = self._topics_of(self.topics)
+        for content in self._contents(topics, self._found.chunks):
+            for channel in content.channels:
+                found.add_messages(topics[channel], content.tails(channel, digest.FROM))
         now, written = found.by_topic(), self._found.digests
         return [topic for topic in written | now if now.get(topic) != written.get(topic)]
 
     def events(self) -> list[Event]:
         """Return the entries of /events, in the order in which they were logged."""
         events = []
-        for record in chain.from_iterable(self._records("/events", self._found.chunks)):
-            entry = LogMessage.FromString(record[HEADER.itemsize :])
-            time = entry.timestamp.ToNanoseconds() / 1e9
-            events.append(Event(time, 0, LogMessage.Level.Name(entry.level), entry.message))
+        for content in self._contents(self._topics_of(["/events"]), self._found.chunks):
+            for channel in content.channels:
+                for record in content.records(channel):
+                    entry = LogMessage.FromString(record[HEADER.itemsize :])
+                    time = entry.timestamp.ToNanoseconds() / 1e9
+                    events.append(Event(time, 0, LogMessage.Level.Name(entry.level), entry.message))
         return events
 
     @cached_property
     def _ends(self) -> tuple[np.void, np.void] | None:
         """Headers of the first and the last control period."""
         topic, chunks = next(iter(self.topics), "/state"), self._found.chunks
-        for first in self._rows(topic, chunks):
-            last = next(self._rows(topic, reversed(chunks)))
-            return first["header"][0], last["header"][-1]
+        for first in self._rows([topic], chunks):
+            last = next(self._rows([topic], reversed(chunks)))
+            return first[topic]["header"][0], last[topic]["header"][-1]
         return None
 
     def require_periods(self) -> None:
@@ -216,30 +250,49 @@ class Log:
                 )
         return list(known) if fields is None else fields
 
-    def _rows(self, topic: str, places: Iterable[ChunkPlace]) -> Iterator[NDArray[np.void]]:
-        """Yield the rows that each of ``places`` has on a periodic topic, where it has any."""
-        dtype = doubles(self.topics.get(topic, {})).record(0).dtype
-        for records in self._records(topic, places):
-            if any(len(record) != dtype.itemsize for record in records):
-                raise ValueError(f"{self.path}: {topic} is not laid out as mjspace writes it")
-            yield np.frombuffer(b"".join(records), dtype)
+    def _joined(
+        self, topic: str, fields: Sequence[str] | None, blocks: Sequence[Mapping[str, Array]]
+    ) -> dict[str, Array]:
+        shapes = {"time": ()} | self.topics[topic]
+        return {
+            name: np.concatenate([np.empty((0, *shapes[name])), *(block[name] for block in blocks)])
+            for name in ("time", *self._fields(topic, fields))
+        }
 
-    def _records(self, topic: str, places: Iterable[ChunkPlace]) -> Iterator[list[bytes]]:
-        for messages in self._messages([topic], places):
-            yield from messages.values()
-
-    def _messages(
+    def _rows(
         self, topics: Iterable[str], places: Iterable[ChunkPlace]
-    ) -> Iterator[dict[str, list[bytes]]]:
-        """Yield the message records that each of ``places`` has on each of ``topics``, if any."""
-        channels = {self._found.channels[t].id: t for t in topics if t in self._found.channels}
+    ) -> Iterator[dict[str, NDArray[np.void]]]:
+        """Yield the rows that each of ``places`` has on periodic topics, where it has any."""
+        channels = self._topics_of(topics)
+        dtypes = {c: doubles(self.topics[topic]).record(0).dtype for c, topic in channels.items()}
+        for content in self._contents(channels, places):
+            found = {}
+            for channel in content.channels:
+                topic = channels[channel]
+                try:
+                    found[topic] = content.rows(channel, dtypes[channel])
+                except ValueError as error:
+                    raise ValueError(
+                        f"{self.path}: {topic} is not laid out as mjspace writes it: {error}"
+                    ) from None
+            if found:
+                yield found
+
+    def _contents(
+        self, channels: Mapping[int, str], places: Iterable[ChunkPlace]
+    ) -> Iterator[Content]:
+        """Yield the content of each of ``places`` on the channels."""
         with self.path.open("rb") as file:
             for place in places:
                 try:
-                    messages = read_messages(file, place, channels)
+                    yield read_content(file, place, channels)
                 except ValueError as error:
                     raise ValueError(f"{self.path}: {error}") from None
-                yield {channels[number]: records for number, records in messages.items() if records}
+
+    def _topics_of(self, topics: Iterable[str]) -> dict[int, str]:
+        """Return those of ``topics`` that the log has, by their channels."""
+        found = self._found.channels
+        return {found[topic].id: topic for topic in topics if topic in found}
 
 
 def _columns(rows: Any, names: Sequence[str]) -> dict[str, Array]:

@@ -1,51 +1,85 @@
 """Long signals in few points: the least and the greatest value of each stretch of a log."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from mjspace.contract import Array
 from mjspace.log.reader import Log
+from mjspace.signals import by_topic
 
 POINTS = 4000  # more than a page has pixels across
+_TOGETHER = 10_000  # rows of which the extremes are found at once: a chunk's are too few
 
 
-def outline(
-    log: Log,
-    topic: str,
-    field: str,
-    change: Callable[[Array], Array] = lambda rows: rows,
-    points: int = POINTS,
-) -> tuple[Array, Array]:
-    """Return (time [s], value) of a field's c components, each (m, c), with m <= ``points`` + 2.
+class Line(NamedTuple):
+    """What is drawn of a log: a field of one of its topics."""
+
+    topic: str
+    field: str
+    change: Callable[[Array], Array] = lambda rows: rows
+    """Applied first, to rows (n, c) in the log's order."""
+
+
+def outlines(log: Log, lines: Sequence[Line], points: int = POINTS) -> list[tuple[Array, Array]]:
+    """Return (time [s], value) of each line's c components, each (m, c), with m <= ``points`` + 2.
 
     Each component has its own times: those of its extremes. Where the log has no more rows than
-    ``points``, all are there. ``change`` is applied first, to rows (n, c) in the log's order. The
-    log is read once, with one chunk of it in memory.
+    ``points``, all are there. The log is read once, with one chunk of it in memory.
 
     Raises:
-        ValueError: the log has no such topic or field, or no row.
+        ValueError: the log has no such topic or field, or no row of it.
     """
     rows_logged = round((log.end - log.start) / float(log.metadata["control_period"])) + 1
     # Two points for each stretch, in their order: a stretch of two rows is those two.
     width = max(2, math.ceil(2 * rows_logged / points))
-    stamps, rows, done = np.empty(0), None, []
-    for block in log.blocks(topic, [field]):
-        new = change(block[field].reshape(len(block["time"]), -1))
-        stamps = np.concatenate([stamps, block["time"]])
-        rows = new if rows is None else np.concatenate([rows, new])
-        whole = len(stamps) // width * width
-        done.append(_extremes(stamps[:whole], rows[:whole], width))
-        stamps, rows = stamps[whole:], rows[whole:]
-    if rows is None:
-        raise ValueError(f"{log.path} holds nothing on {topic}")
-    missing = -len(stamps) % width
-    stamps = np.pad(stamps, (0, missing), mode="edge") if missing else stamps
-    rows = np.pad(rows, ((0, missing), (0, 0)), mode="edge") if missing else rows
-    done.append(_extremes(stamps, rows, width))
-    times, values = zip(*done, strict=True)
-    return np.concatenate(times), np.concatenate(values)
+    drawn = [_Outline(line, width) for line in lines]
+    for blocks in log.blocks_of_topics(by_topic((line.topic, line.field) for line in lines)):
+        for outline in drawn:
+            if outline.line.topic in blocks:
+                outline.add(blocks[outline.line.topic])
+    for outline in drawn:
+        if not outline.begun:
+            raise ValueError(f"{log.path} holds nothing on {outline.line.topic}")
+    return [outline.points() for outline in drawn]
+
+
+class _Outline:
+    """The extremes of a line so far, and the rows that are not in a stretch yet."""
+
+    def __init__(self, line: Line, width: int) -> None:
+        self.line = line
+        self._width = width
+        self._stamps: list[Array] = []
+        self._rows: list[Array] = []
+        self._done: list[tuple[Array, Array]] = []
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is any row."""
+        return bool(self._stamps)
+
+    def add(self, block: Mapping[str, Array]) -> None:
+        """Add the rows of a chunk."""
+        time = block["time"]
+        self._stamps.append(time)
+        self._rows.append(self.line.change(block[self.line.field].reshape(len(time), -1)))
+        if sum(map(len, self._stamps)) >= _TOGETHER:
+            stamps, rows = np.concatenate(self._stamps), np.concatenate(self._rows)
+            whole = len(stamps) // self._width * self._width
+            self._done.append(_extremes(stamps[:whole], rows[:whole], self._width))
+            self._stamps, self._rows = [stamps[whole:]], [rows[whole:]]
+
+    def points(self) -> tuple[Array, Array]:
+        """Return times and values, each (m, c), with those of the last stretch."""
+        stamps, rows = np.concatenate(self._stamps), np.concatenate(self._rows)
+        if missing := -len(stamps) % self._width:
+            stamps = np.pad(stamps, (0, missing), mode="edge")
+            rows = np.pad(rows, ((0, missing), (0, 0)), mode="edge")
+        times, values = zip(*self._done, _extremes(stamps, rows, self._width), strict=True)
+        return np.concatenate(times), np.concatenate(values)
 
 
 def _extremes(stamps: Array, rows: Array, width: int) -> tuple[Array, Array]:

@@ -49,7 +49,7 @@ def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:
     """
     log = Log.of(log)
     scenario = scenario_of(log)
-    found = list(chosen(log, signals) if signals else curves(log))
+    found = chosen(log, signals) if signals else curves(log)
     warnings = [e.time for e in log.events() if e.level in ("WARNING", "ERROR", "FATAL")]
     rows = max(1, (len(found) + 1) // 2)
     height = HEAD + rows * (PANEL + BETWEEN) - BETWEEN + FOOT

@@ -1,6 +1,6 @@
 """The panels of a page: one for each signal that has something to show."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from mjspace.contract import Array
 from mjspace.log import topics
 from mjspace.log.reader import Log
-from mjspace.plotting.decimate import outline
+from mjspace.plotting.decimate import Line, outlines
 from mjspace.signals import find_signal
 from mjspace.units import Unit
 
@@ -77,36 +77,48 @@ STANDARD = (
 )
 
 
-def curves(log: Log) -> Iterator[Curves]:
-    """Yield the curves of the standard page: its signals, and the first of the law's that change.
+def curves(log: Log) -> list[Curves]:
+    """Return the curves of the standard page: its signals, and the first of the law's that change.
 
     A signal that is zero throughout is left out, and so is one of the law's that never changes.
     """
-    for panel in STANDARD:
-        if log.topics.get(panel.topic, {}).get(panel.field, (0,)) != (0,):
-            found = read(log, panel)
-            if found.value.any():
-                yield found
-    shown = 0
-    for field in log.topics.get("/law", {}):
-        found = read(log, _of_signal(log, f"law.{field}"))
-        if shown < LAW_PANELS and np.ptp(found.value, axis=0).any():
-            shown += 1
-            yield found
+    standard = [
+        panel
+        for panel in STANDARD
+        if log.topics.get(panel.topic, {}).get(panel.field, (0,)) != (0,)
+    ]
+    law = [_of_signal(log, f"law.{field}") for field in log.topics.get("/law", {})]
+    found = read(log, [*standard, *law])
+    shown = [one for one in found[: len(standard)] if one.value.any()]
+    changing = [one for one in found[len(standard) :] if np.ptp(one.value, axis=0).any()]
+    return [*shown, *changing[:LAW_PANELS]]
 
 
-def chosen(log: Log, signals: Sequence[str]) -> Iterator[Curves]:
-    """Yield the curves of ``signals``, named as in a check: ``law.theta_hat``, ``truth.rate[0]``.
+def chosen(log: Log, signals: Sequence[str]) -> list[Curves]:
+    """Return the curves of ``signals``, named as in a check: ``law.theta_hat``, ``truth.rate[0]``.
 
     Raises:
         ValueError: the log has no such signal, with the near names.
     """
-    for signal in signals:
-        yield read(log, _of_signal(log, signal))
+    return read(log, [_of_signal(log, signal) for signal in signals])
 
 
-def read(log: Log, panel: Panel) -> Curves:
-    """Return the panel's curves from the log."""
+def read(log: Log, panels: Sequence[Panel]) -> list[Curves]:
+    """Return the panels' curves from the log, which is read once."""
+    lines = {}
+    for number, panel in enumerate(panels):
+        lines[number, "value"] = Line(panel.topic, panel.field, _change(panel))
+        if panel.desired is not None and panel.desired[1] in log.topics.get(panel.desired[0], {}):
+            lines[number, "desired"] = Line(*panel.desired, _change(panel))
+    found = dict(zip(lines, outlines(log, list(lines.values())), strict=True))
+    return [
+        Curves(panel, *found[number, "value"], *found.get((number, "desired"), ()))
+        for number, panel in enumerate(panels)
+    ]
+
+
+def _change(panel: Panel) -> Callable[[Array], Array]:
+    """Return what makes the panel's values of a field's rows (n, c), which come in their order."""
     first: list[Array] = []
 
     def change(rows: Array) -> Array:
@@ -117,10 +129,7 @@ def read(log: Log, panel: Panel) -> Curves:
             rows = np.linalg.norm(rows - first[0], axis=1, keepdims=True)
         return panel.scale * rows
 
-    time, value = outline(log, panel.topic, panel.field, change)
-    if panel.desired is None or panel.desired[1] not in log.topics.get(panel.desired[0], {}):
-        return Curves(panel, time, value)
-    return Curves(panel, time, value, *outline(log, *panel.desired, change))
+    return change
 
 
 def unit(log: Log, topic: str, field: str) -> Unit:

@@ -1,6 +1,7 @@
 """Two signals of a log against each other: a phase plane, and when which thrusters fired."""
 
 import textwrap
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.plotting.panels import unit
 from mjspace.plotting.style import COLORS, FAINT, INK, STYLE
-from mjspace.signals import find_signal
+from mjspace.signals import by_topic, find_signal
 
 WIDTH, HEIGHT = 7.5, 6.0  # inches
 GROUPS = 6
@@ -41,7 +42,15 @@ def figure(log: Log, x: str, y: str) -> Figure:
 
     Where thrusters fired, the path has the color of those that did; dots are where that changed.
     """
-    (across, x_label), (up, y_label) = (_component(log, signal) for signal in (x, y))
+    places = [_component(log, signal) for signal in (x, y)]
+    fields = by_topic((topic, field) for topic, field, _ in places)
+    has_thrusters = bool(log.topics.get("/command", {}).get("on_time"))
+    if has_thrusters:
+        fields.setdefault("/command", []).append("on_time")
+    rows = log.read_topics(fields)
+    (across, x_label), (up, y_label) = (
+        _values(log, rows, signal, place) for signal, place in zip((x, y), places, strict=True)
+    )
     page = Figure(figsize=(WIDTH, HEIGHT))
     FigureCanvasAgg(page)
     axes = page.subplots()
@@ -49,9 +58,8 @@ def figure(log: Log, x: str, y: str) -> Figure:
     axes.axhline(0.0, color=FAINT, lw=0.7, zorder=1)
     axes.axvline(0.0, color=FAINT, lw=0.7, zorder=1)
     axes.plot(across, up, color=FAINT, lw=1.1, zorder=2, label="coast")
-    on_time = log.topics.get("/command", {}).get("on_time")
-    if on_time:
-        _show_thrusters(axes, across, up, log.read("/command", ["on_time"])["on_time"] > 0.0)
+    if has_thrusters:
+        _show_thrusters(axes, across, up, rows["/command"]["on_time"] > 0.0)
     _show_direction(axes, across, up)
     axes.plot(across[:1], up[:1], "o", color=INK, mfc="white", ms=6.5, zorder=6, label="start")
     axes.plot(across[-1:], up[-1:], "s", color=INK, ms=5.0, zorder=6, label="end")
@@ -68,15 +76,22 @@ def figure(log: Log, x: str, y: str) -> Figure:
     return page
 
 
-def _component(log: Log, signal: str) -> tuple[Array, str]:
-    """Return the signal's values (n,) in the displayed unit, and the label of their axis."""
+def _component(log: Log, signal: str) -> tuple[str, str, int]:
+    """Return the topic and field of the signal, and which of its numbers it is."""
     topic, field, part = find_signal(log.topics, signal)
     if part.stop - part.start != 1:
         raise ValueError(
             f"signal {signal!r} has {part.stop - part.start} numbers: pick one, as [0]"
         )
-    rows = log.read(topic, [field])[field]
-    values = rows.reshape(len(rows), -1)[:, part.start]
+    return topic, field, part.start
+
+
+def _values(
+    log: Log, rows: Mapping[str, Mapping[str, Array]], signal: str, place: tuple[str, str, int]
+) -> tuple[Array, str]:
+    """Return the signal's values (n,) in the displayed unit, and the label of their axis."""
+    topic, field, number = place
+    values = rows[topic][field].reshape(len(rows[topic]["time"]), -1)[:, number]
     name, scale = unit(log, topic, field).displayed
     return scale * values, f"{signal} [{name}]" if name else signal
 

@@ -13,21 +13,22 @@ from mjspace.rendering.video import Frame
 WHITE, GREY, SHADE = (255, 255, 255, 255), (200, 208, 220, 255), (0, 0, 0, 96)
 
 
-def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> Frame:
-    """Return the frame with two lines of text in each lower corner, the upper ones larger.
+def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> None:
+    """Write two lines of text into each lower corner of the frame, the upper ones larger.
 
     Font sizes scale with the frame's height, down to the smallest that is legible.
     """
     height, width = frame.shape[:2]
-    image = Image.fromarray(frame)
-    draw = ImageDraw.Draw(image, "RGBA")
     margin, large, small = round(0.035 * height), max(11, height // 25), max(9, height // 36)
     upper, lower = height - margin - round(1.45 * small), height - margin
-    draw.rectangle((0, upper - large - margin // 2, width, height), fill=SHADE)
+    top = max(upper - large - margin // 2, 0)
+    band = Image.fromarray(frame[top:])  # a copy of what changes alone
+    draw = ImageDraw.Draw(band, "RGBA")
+    draw.rectangle((0, 0, width, height), fill=SHADE)
     for x, anchor, lines in ((margin, "ls", left), (width - margin, "rs", right)):
-        draw.text((x, upper), lines[0], WHITE, _font("DejaVuSans-Bold", large), anchor)
-        draw.text((x, lower), lines[1], GREY, _font("DejaVuSans", small), anchor)
-    return np.asarray(image)
+        draw.text((x, upper - top), lines[0], WHITE, _font("DejaVuSans-Bold", large), anchor)
+        draw.text((x, lower - top), lines[1], GREY, _font("DejaVuSans", small), anchor)
+    frame[top:] = np.asarray(band)
 
 
 def angle_text(angle: float) -> str:

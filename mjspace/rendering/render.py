@@ -115,7 +115,9 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
             strict=True,
         ):
             stage.set(float(time), physics, desired, on_time, thrust)
-            yield overlay.write(canvas.draw(stage.scene), left, (f"{time:.2f} s", caption))
+            frame = canvas.draw(stage.scene)
+            overlay.write(frame, left, (f"{time:.2f} s", caption))
+            yield frame
 
 
 def shares_of_thrust(log: Log, engine: Any, times: Array) -> Iterator[float]:

@@ -7,11 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from mjspace.contract import TICK, Array
+from mjspace.contract import TICK
 from mjspace.errors import InputError, input_error_at
 from mjspace.log.reader import Log
+from mjspace.runner.statistic import Statistic
 from mjspace.scenario.scenario import Check, EventTable
-from mjspace.signals import Topics, find_signal, magnitude
+from mjspace.signals import Topics, by_topic, find_signal, magnitude
 
 Outcome = Literal["PASS", "FAIL", "not measured"]
 
@@ -93,33 +94,65 @@ def judge(log: Log, checks: Sequence[Check], events: Sequence[EventTable] = ()) 
         own = any(check.signal == NO_CRASH.signal for check in checks)
         checks = checks if own else [*checks, NO_CRASH]
     named = [name for check in checks for name in (check.since, check.until) if name]
-    happened = {event.name: _first(log, event) for event in events if event.name in named}
-    return [_verdict(log, check, happened) for check in checks]
+    happened = _first_times(log, [event for event in events if event.name in named])
+    found = [
+        None if _never(check, happened) else Statistic(check, log.topics, *_window(check, happened))
+        for check in checks
+    ]
+    _gather(log, [statistic for statistic in found if statistic is not None])
+    return [
+        _verdict(check, statistic, happened) for check, statistic in zip(checks, found, strict=True)
+    ]
 
 
-def _first(log: Log, event: EventTable) -> float:
-    """Return when the event's signal is in its region first [s]; nan if never."""
-    topic, field, part = find_signal(log.topics, event.signal)
-    for block in log.blocks(topic, [field], start=None, end=None):
-        rows = block[field].reshape(len(block["time"]), -1)
-        inside = event.admits(magnitude(rows[:, part]))
-        if inside.any():
-            return float(block["time"][np.argmax(inside)])
-    return math.nan
+def _first_times(log: Log, events: Sequence[EventTable]) -> dict[str, float]:
+    """Return when each event's signal is in its region first [s], by its name; nan if never."""
+    happened = {event.name: math.nan for event in events}
+    signals = {event.name: find_signal(log.topics, event.signal) for event in events}
+    fields = by_topic((topic, field) for topic, field, _ in signals.values())
+    for blocks in log.blocks_of_topics(fields) if events else ():
+        for event in events:
+            topic, field, part = signals[event.name]
+            if topic not in blocks or not math.isnan(happened[event.name]):
+                continue
+            block = blocks[topic]
+            rows = block[field].reshape(len(block["time"]), -1)
+            inside = event.admits(magnitude(rows[:, part]))
+            if inside.any():
+                happened[event.name] = float(block["time"][np.argmax(inside)])
+        if not any(map(math.isnan, happened.values())):
+            break
+    return happened
 
 
-def _verdict(log: Log, check: Check, happened: Mapping[str, float]) -> Verdict:
-    never = [name for name in (check.since, check.until) if name and math.isnan(happened[name])]
-    if never:
-        return Verdict(check, math.nan, f"event {never[0]!r} never happened")
-    start, end = _window(check, happened)
-    count, measured = _measure(log, check, start, end)
-    if count == 0:
-        until = "the end" if end == math.inf else f"{end:.6g} s"
-        return Verdict(check, math.nan, f"no sample from {start:.6g} s to {until}")
+def _gather(log: Log, statistics: Sequence[Statistic]) -> None:
+    """Read the log once, as far as one of the windows reaches."""
+    if not statistics:
+        return
+    start, end = min(s.start for s in statistics), max(s.end for s in statistics)
+    fields = by_topic((s.topic, s.field) for s in statistics)
+    for blocks in log.blocks_of_topics(fields, start, None if end == math.inf else end):
+        for statistic in statistics:
+            if statistic.topic in blocks:
+                statistic.add(blocks[statistic.topic])
+
+
+def _verdict(check: Check, statistic: Statistic | None, happened: Mapping[str, float]) -> Verdict:
+    if statistic is None:
+        return Verdict(check, math.nan, f"event {_never(check, happened)!r} never happened")
+    if statistic.count == 0:
+        until = "the end" if statistic.end == math.inf else f"{statistic.end:.6g} s"
+        return Verdict(check, math.nan, f"no sample from {statistic.start:.6g} s to {until}")
+    measured = statistic.value
     return Verdict(
         check, measured, f"{check.signal} is not a number" if math.isnan(measured) else ""
     )
+
+
+def _never(check: Check, happened: Mapping[str, float]) -> str:
+    """Return the first event that the check counts from and that never happened; else ''."""
+    named = (name for name in (check.since, check.until) if name)
+    return next((name for name in named if math.isnan(happened[name])), "")
 
 
 def _window(check: Check, happened: Mapping[str, float]) -> tuple[float, float]:
@@ -128,43 +161,3 @@ def _window(check: Check, happened: Mapping[str, float]) -> tuple[float, float]:
     end = math.inf if check.end is None else zero + check.end
     before = happened[check.until] - TICK if check.until else math.inf
     return zero + check.start, min(end, before)
-
-
-def _measure(log: Log, check: Check, start: float, end: float) -> tuple[int, float]:
-    """Return how many samples the window has, and their statistic."""
-    topic, field, part = find_signal(log.topics, check.signal)
-    target = None if check.target is None else np.asarray(check.target, dtype=float)
-    count, total, peak, least, last = 0, 0.0, -np.inf, np.inf, np.nan
-    first: Array | None = None
-    for block in log.blocks(topic, [field], start=start, end=None if end == math.inf else end):
-        rows = block[field].reshape(len(block["time"]), -1)[:, part]
-        if target is not None:
-            rows = rows - target
-        if first is None:
-            first = rows[0]
-        if check.statistic == "drift":
-            rows = rows - first
-        values = magnitude(rows)
-        if check.statistic in ("peak", "drift") or target is not None:
-            values = np.abs(values)
-        count += len(values)
-        total += float(np.sum(values**2 if check.statistic == "rms" else values))
-        # max and min pass NaN on, which must fail every bound
-        peak, least, last = (
-            float(np.max([peak, values.max()])),
-            float(np.min([least, values.min()])),
-            float(values[-1]),
-        )
-    if count == 0:
-        return 0, math.nan
-    scale = float(np.linalg.norm(target)) if check.relative and target is not None else 1.0
-    measured = {
-        "max": peak,
-        "peak": peak,
-        "drift": peak,
-        "min": least,
-        "mean": total / count,
-        "rms": math.sqrt(abs(total / count)),  # of squares only where the statistic is rms
-        "final": last,
-    }[check.statistic]
-    return count, measured / scale

@@ -110,9 +110,7 @@ def verify(
         for block in fly(assembly, begin, [int(log.metadata["member"])]):
             flown = one_vehicle(block)
             _check_topics(log, block)
-            logged = {
-                topic: log.read(topic, start=block.time[0], end=block.time[-1]) for topic in flown
-            }
+            logged = log.read_topics(dict.fromkeys(flown), start=block.time[0], end=block.time[-1])
             found = first_difference(logged, flown)
             if found is not None:
                 return dataclasses.replace(found, reason=_other_streams(log, assembly.scenario))

@@ -13,11 +13,9 @@ from pydantic_core import core_schema
 
 @dataclass(frozen=True)
 class DeclaredIn:
-    """Marks a key whose table is declared in another file, which is imported when it is needed.
+    """Marks a key whose table is declared in another file, imported when a scenario has the key.
 
-    A scenario can so name the tables of rooms that build on it. The model that has the key, and
-    every model around it, needs ``defer_build=True`` in its ``model_config``: its schema is then
-    built when a scenario is first validated.
+    A scenario can so name the tables of rooms that build on it.
     """
 
     place: str
@@ -36,8 +34,13 @@ class DeclaredIn:
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
         """Validate as the table does."""
-        schema = handler.generate_schema(self.table)
+        schema = core_schema.with_info_after_validator_function(
+            self._validated, core_schema.any_schema()
+        )
         return core_schema.nullable_schema(schema) if self.optional else schema
+
+    def _validated(self, value: Any, info: core_schema.ValidationInfo) -> BaseModel:
+        return self.table.model_validate(value, context=info.context)
 
 
 def declaration(field: FieldInfo) -> DeclaredIn | None:

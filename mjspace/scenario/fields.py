@@ -104,6 +104,4 @@ Matrix3 = Annotated[
 class Table(BaseModel):
     """A TOML table: frozen, and with no key that is not listed."""
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, defer_build=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)

@@ -1,11 +1,8 @@
-"""Reading scenarios: find the file, apply overrides, validate, say in one line what is wrong."""
+"""Loading scenarios: read the file, apply overrides, validate, say in one line what is wrong."""
 
-import difflib
 import re
-import tomllib
 import warnings
 from collections.abc import Iterable, Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +10,12 @@ import tomli_w
 from pydantic import BaseModel, ValidationError
 
 from mjspace.errors import InputError, nearest
+from mjspace.scenario import files
 from mjspace.scenario import overrides as keys
 from mjspace.scenario.construct import plain
 from mjspace.scenario.declared import tables_in, type_of
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.sensors import kinds
-
-
-def scenario_names() -> list[str]:
-    """Return the names of the scenarios that come with mjspace."""
-    folder = resources.files("mjspace.scenarios")
-    return sorted(p.name[:-5] for p in folder.iterdir() if p.name.endswith(".toml"))
-
-
-def list_scenarios() -> dict[str, str]:
-    """Return the description of each scenario that comes with mjspace, by name, unvalidated."""
-    return {name: _read(_find(name), ())["description"] for name in scenario_names()}
 
 
 def load(scenario: str | Path, overrides: Iterable[str] = ()) -> tuple[Scenario, Path]:
@@ -43,8 +30,8 @@ def load(scenario: str | Path, overrides: Iterable[str] = ()) -> tuple[Scenario,
     Raises:
         InputError: no such scenario, no TOML, or a key that is wrong; one line.
     """
-    path = _find(str(scenario))
-    table = _read(path, ())
+    path = files.find(str(scenario))
+    table = files.read(path)
     origins = keys.apply(table, overrides)
     cut = {"cut_short": "duration" in origins}
     found = validate(table, str(path), origins, context=cut)
@@ -102,73 +89,6 @@ def to_toml(scenario: Scenario) -> str:
     """Return the scenario as TOML with every default written out."""
     table: str = tomli_w.dumps(plain(_without_none(scenario.model_dump(mode="python"))))
     return table
-
-
-def _read(path: Path, upon: tuple[Path, ...]) -> dict[str, Any]:
-    """Return the file's table merged over its base's; ``upon`` are the files based on it."""
-    try:
-        table = tomllib.loads(path.read_text())
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: {error}") from None
-    if not table.keys() & {"base", *Scenario.model_fields}:
-        have = ", ".join(table) or "nothing"
-        raise InputError(f"{path} is not a scenario: it has {have}, but no duration or law")
-    table.setdefault("name", path.stem)
-    if "base" not in table:
-        return table
-    base, upon = table.pop("base"), (*upon, path.resolve())
-    if not isinstance(base, str):
-        raise InputError(f"{path}: base: got {base!r}, should be a scenario's name or a path")
-    try:
-        below = _find(str(path.parent / base) if _is_path(base) else base)
-    except InputError as error:
-        raise InputError(f"{path}: base: {error}") from None
-    if below.resolve() in upon:
-        raise InputError(f"{path}: base: {base!r} is based on this file itself")
-    return _merged(_read(below, upon), table)
-
-
-def _merged(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
-    """Return ``base`` with the keys of ``table``: tables merge, all else is replaced."""
-    if "kind" in table and table["kind"] != base.get("kind"):
-        return table  # the gains of one law mean nothing to another
-    merged = dict(base)
-    for key, value in table.items():
-        old = base.get(key)
-        tables = isinstance(value, dict) and isinstance(old, dict)
-        merged[key] = _merged(base[key], value) if tables else value
-    return merged
-
-
-def _is_path(scenario: str) -> bool:
-    return "/" in scenario or bool(Path(scenario).suffix)
-
-
-def _find(scenario: str) -> Path:
-    path = Path(scenario)
-    if scenario in scenario_names():
-        return Path(str(resources.files("mjspace.scenarios") / f"{scenario}.toml"))
-    if path.is_dir():
-        raise InputError(f"{scenario} is a folder: give a scenario's name or its TOML file")
-    if path.is_file() and path.suffix != ".toml":
-        raise InputError(f"{scenario} is not a scenario, a TOML file: {_purpose(path)}")
-    if _is_path(scenario):
-        if not path.is_file():
-            raise InputError(f"no scenario file {scenario}")
-        return path
-    near = difflib.get_close_matches(scenario, scenario_names(), n=1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    raise InputError(f"no scenario {scenario!r}: {hint}'mjspace list' shows them")
-
-
-def _purpose(path: Path) -> str:
-    """Return what a file that is no scenario is for."""
-    return {
-        ".mcap": "it is the log of a flight, for 'mjspace replay', 'info', 'plot' or 'render'",
-        ".xml": "a model is checked by 'mjspace validate --model', and named in [plant] model",
-        ".urdf": "a model is checked by 'mjspace validate --model', and named in [plant] model",
-        ".py": f'a law in it is named in a scenario\'s [law], as kind = "{path.name}:Class"',
-    }.get(path.suffix, "'mjspace list' shows those that come with mjspace")
 
 
 def _related(one: str, other: str) -> bool:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from mjspace.scenario.declared import DeclaredIn, declaration
 from mjspace.scenario.fields import (
@@ -71,8 +71,6 @@ class Part(Table):
 
 class PlantTable(Table):
     """The vehicle: an assembly from assets/, with its mass properties, parts and actuators."""
-
-    model_config = ConfigDict(defer_build=True)
 
     model: str = "satellite_3rw"
     """Name of a folder in assets/."""

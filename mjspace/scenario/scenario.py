@@ -27,7 +27,7 @@ from mjspace.units import any_to_si, whole_number
 class Component(BaseModel):
     """A law or a reference: ``kind`` names a class, every other key is one of its gains."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="allow", frozen=True)
 
     kind: str
     """``"module:Class"`` in controllers/, or ``"path/to/file.py:Class"`` beside the scenario."""
@@ -145,8 +145,6 @@ class Check(SignalRegion):
 
 class Scenario(Table):
     """One flight, whole: what flies, where, under which law, how long, and what it must show."""
-
-    model_config = ConfigDict(defer_build=True)
 
     name: str = ""
     """The file's name when left out."""

@@ -3,11 +3,11 @@
 from math import cos, sin, sqrt
 from typing import Annotated, Any, ClassVar, Literal
 
-import numba
 import numpy as np
 from pydantic import Field
 
 from mjspace.contract import Array
+from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import NonNegative, Si
 from mjspace.sensors.base import Sensor
 
@@ -31,11 +31,11 @@ class StarTracker(Sensor[Annotated[NonNegative, Si("rad")]]):
         error of an angle rounded to a digit, digit / sqrt(12), about every axis in every attitude,
         which rounded Euler angles or rotation vectors have not.
         """
-        turned: Array = _turn(value, error, self.quantization)
+        turned: Array = _turn.ufunc(value, error, self.quantization)
         return turned
 
 
-@numba.guvectorize(["void(f8[:], f8[:], f8, f8[:])"], "(q),(a),()->(q)", cache=True)
+@gufunc(["void(f8[:], f8[:], f8, f8[:])"], "(q),(a),()->(q)")
 def _turn(q: Any, error: Any, digit: Any, turned: Any) -> None:
     angle = sqrt(error[0] * error[0] + error[1] * error[1] + error[2] * error[2])
     scale = sin(0.5 * angle) / angle if angle > 0.0 else 0.5

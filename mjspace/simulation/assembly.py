@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from mjspace.actuators.actuator_set import ActuatorSet
 from mjspace.actuators.base import Actuator, Context
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array, Law, ReferenceSource
-from mjspace.environment.geomagnetism import FieldAlongOrbit, along
 from mjspace.environment.install import userdata, userdata_size
 from mjspace.environment.orbit import orbit_position
 from mjspace.errors import input_error_at
@@ -25,6 +24,9 @@ from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact
 from mjspace.vehicle.vehicle import Vehicle, build, initial_state
+
+if TYPE_CHECKING:
+    from mjspace.environment.geomagnetism import FieldAlongOrbit
 
 METHODS = {
     "law": ("reset(measurement, reference)", "step(state, time, measurement, reference)"),
@@ -46,7 +48,7 @@ class Assembly:
     """At time zero, (nv,)."""
     userdata: Array
     """The environment's parameters, one row (nuserdata,)."""
-    field: FieldAlongOrbit | None
+    field: "FieldAlongOrbit | None"
     """The Earth's magnetic field where the vehicle goes; None where there is none."""
     actuators: ActuatorSet
     reference: ReferenceSource
@@ -167,7 +169,7 @@ def assemble(
             scenario.environment,
             scenario.plant,
         ),
-        field=_part("environment", along, scenario.environment, scenario.rates, scenario.duration),
+        field=_part("environment", _magnetic_field, scenario),
         actuators=_part("plant", _actuators, vehicle, scenario, inner=inner),
         reference=reference,
         law=law if getattr(law, "batched", False) else UnbatchedLaw(law),
@@ -241,6 +243,15 @@ def _actuators(vehicle: Vehicle, scenario: Scenario, *, inner: bool) -> Actuator
             )
             kinds += (table.actuator(context),)
     return ActuatorSet(kinds)
+
+
+def _magnetic_field(scenario: Scenario) -> "FieldAlongOrbit | None":
+    """Return the Earth's magnetic field where the vehicle goes; None where it has none."""
+    if scenario.environment.magnetic_field is None:
+        return None
+    from mjspace.environment.geomagnetism import along  # with SciPy's splines, which take 0.2 s
+
+    return along(scenario.environment, scenario.rates, scenario.duration)
 
 
 def _gravity_at_start(scenario: Scenario) -> float:

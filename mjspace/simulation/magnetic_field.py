@@ -1,10 +1,12 @@
 """The Earth's magnetic field along the orbit as a step effect: the piece that holds now."""
 
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from mjspace.environment.geomagnetism import FieldAlongOrbit
 from mjspace.environment.magnetic_field import FIELD
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
+
+if TYPE_CHECKING:
+    from mjspace.environment.geomagnetism import FieldAlongOrbit
 
 
 class MagneticField(StepEffect):
@@ -13,11 +15,11 @@ class MagneticField(StepEffect):
     name: ClassVar[str] = "the magnetic field"
 
     @classmethod
-    def of(cls, field: FieldAlongOrbit | None) -> Self | None:
+    def of(cls, field: "FieldAlongOrbit | None") -> Self | None:
         """Return the effect of the ``field``; None where there is none."""
         return None if field is None else cls(field)
 
-    def __init__(self, field: FieldAlongOrbit) -> None:
+    def __init__(self, field: "FieldAlongOrbit") -> None:
         """Keep the ``field`` along the orbit."""
         self._field = field
         self._acting: Any = None

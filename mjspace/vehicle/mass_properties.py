@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.spatial.transform import Rotation
 
 from mjspace.contract import Array
 from mjspace.scenario.hinges import Bearing
 from mjspace.scenario.plant import PlantTable
+
+# SciPy is imported when a vehicle is built: it takes 0.3 s, and a scenario's tables need no more
+# of this file than its named tuples.
 
 
 class Inertial(NamedTuple):
@@ -108,6 +109,8 @@ def bus(table: PlantTable, wheels: Rotors, own: Array) -> tuple[Inertial, Array]
 
 def principal(inertia: Array) -> tuple[Array, Array]:
     """Return the principal moments (3,), ascending, and axes (4,) of an inertia matrix (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # right-handed
     return moments, Rotation.from_matrix(axes).as_quat(scalar_first=True)
@@ -149,6 +152,8 @@ def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inert
 
 def tensor(inertia: Array, iquat: Array) -> Array:
     """Return the inertia matrix [kg m^2] of principal moments (3,) and axes (4,), shape (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
     axes = Rotation.from_quat(iquat, scalar_first=True).as_matrix()
     result: Array = axes @ np.diag(inertia) @ axes.T
     return result
@@ -165,6 +170,8 @@ def _too_much(inertia: Array, room: Array, across: Array, wheels: Rotors) -> str
     if np.linalg.eigvalsh(room)[0] <= 0.0:
         cure = "use lighter wheels or place them nearer to the centre of mass"
     else:
+        from scipy.linalg import eigh
+
         fits = wheels.transverse_inertia / eigh(across, room, eigvals_only=True)[-1]
         cure = (
             f"use a wheel inertia below {2.0 * fits:.4g} kg m^2"

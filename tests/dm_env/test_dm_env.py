@@ -21,7 +21,8 @@ from mjspace import dm_env
 from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Measurement
 from mjspace.errors import InputError
-from mjspace.scenario.loading import load, scenario_names
+from mjspace.scenario.files import scenario_names
+from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import INTEGRATION, first_start
 from mjspace.simulation.loop import fly

@@ -16,7 +16,9 @@ from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.contract import Array
+from mjspace.log import reader
 from mjspace.log.chunk import encode, message
+from mjspace.log.content import Content, read_content
 from mjspace.log.encoding import Fields, doubles, varint5
 from mjspace.log.file import LogFile
 from mjspace.log.reader import Log
@@ -137,6 +139,31 @@ def test_a_window_holds_both_its_ends_and_every_nth_row_between(
     assert list(read) == ["time", "law_p"]
     np.testing.assert_array_equal(read["time"], time[chosen])
     np.testing.assert_array_equal(read["law_p"], values["/state"]["law_p"][chosen])
+
+
+def test_topics_side_by_side_are_what_each_is_alone_and_each_chunk_is_read_once(
+    flown: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = Log(flown)
+    window: dict[str, Any] = {"start": 0.003, "end": 0.15, "every": 3}
+    alone = {
+        "/truth": log.read("/truth", ["attitude"], **window),
+        "/state": log.read("/state", **window),
+    }
+    read: list[int] = []
+
+    def noted(file: Any, place: Any, channels: Any) -> Content:
+        read.append(place.position)
+        return read_content(file, place, channels)
+
+    monkeypatch.setattr(reader, "read_content", noted)
+    together = log.read_topics({"/truth": ["attitude"], "/state": None}, **window)
+    assert len(read) == len(set(read)) == len(BLOCKS)
+    assert list(together) == list(alone)
+    for topic, columns in alone.items():
+        assert {n: c.tobytes() for n, c in together[topic].items()} == {
+            n: c.tobytes() for n, c in columns.items()
+        }
 
 
 @pytest.mark.parametrize(

@@ -269,6 +269,22 @@ def test_a_damaged_chunk_does_not_matter_to_what_is_in_others(tmp_path: Path) ->
     assert [event.message for event in Log(path).events()] == ["period 5"]
 
 
+def test_a_damaged_index_is_named(whole: Path) -> None:
+    with whole.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    first = summary.chunk_indexes[0]
+    content = bytearray(whole.read_bytes())
+    for position in first.message_index_offsets.values():
+        content[position + 9 + 6 + 8 + 7] ^= 0xFF  # of the first offset, its highest byte
+    path = whole.with_name("damaged.mcap")
+    path.write_bytes(content)
+    where = f"the index of the chunk at byte {first.chunk_start_offset + 9} is damaged"
+    for read in (Log(path).altered, lambda: Log(path).read("/truth")):
+        with pytest.raises(ValueError, match=where):
+            read()
+
+
 def test_messages_that_another_program_encoded_anew_are_not_misread(tmp_path: Path) -> None:
     path = tmp_path / "anew.mcap"
     fields = {"energy": (), "rate": (3,)}

@@ -1,6 +1,7 @@
 """The page of plots: what is on it, and that no extreme of a long signal is lost."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,9 @@ from PIL import Image
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.plotting.check_bounds import Bound, bounds
-from mjspace.plotting.decimate import outline
+from mjspace.plotting.decimate import Line, outlines
 from mjspace.plotting.page import figure, plot
-from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel
+from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel, curves
 from mjspace.scenario.scenario import Check
 
 ERROR, RATE, SPEED, MOMENTUM = (
@@ -131,7 +132,7 @@ def test_saturation_is_marked_on_every_panel(page: Figure, log: Log) -> None:
 
 def test_a_few_points_keep_the_extremes(log: Log) -> None:
     whole = log.read("/command", ["torque"])
-    time, value = outline(log, "/command", "torque", points=40)
+    ((time, value),) = outlines(log, [Line("/command", "torque")], points=40)
     assert len(time) <= 42
     np.testing.assert_array_equal(value.max(axis=0), whole["torque"].max(axis=0))
     np.testing.assert_array_equal(value.min(axis=0), whole["torque"].min(axis=0))
@@ -142,13 +143,27 @@ def test_a_few_points_keep_the_extremes(log: Log) -> None:
         assert (np.diff(time[:, component]) >= 0.0).all()
 
 
+def test_the_log_is_read_once(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+    passes: list[set[str]] = []
+
+    def noted(log: Log, fields: Any) -> Any:
+        passes.append({*fields})
+        return blocks_of_topics(log, fields)
+
+    monkeypatch.setattr(Log, "blocks_of_topics", noted)
+    assert len(curves(log)) == 11
+    assert passes == [{"/truth", "/reference", "/command", "/law", "/disturbance"}]
+
+
 def test_a_short_log_keeps_every_row(log: Log) -> None:
     whole = log.read("/truth", ["rate"])
-    time, value = outline(log, "/truth", "rate")
+    ((time, value),) = outlines(log, [Line("/truth", "rate")])
     assert len(whole["time"]) == 1001
     np.testing.assert_array_equal(value[:1001], whole["rate"])
     np.testing.assert_array_equal(time[:1001, 0], whole["time"])
 
+
+blocks_of_topics = Log.blocks_of_topics
 
 CHECKS = [
     Check(name="a", signal="truth.attitude_error", below=0.1, start=0.2, end=0.9),

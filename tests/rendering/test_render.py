@@ -108,12 +108,12 @@ def test_the_caption_says_when_and_how_well(
     pictured_log: Path, still: Callable[..., Pixels]
 ) -> None:
     error = float(Log(pictured_log).nearest("/truth", 0.5)["attitude_error"].item())
-    black = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    written = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     lines = (
         ("contraction-adaptive", "contraction:Adaptive"),
         ("0.50 s", f"attitude error {overlay.angle_text(error)}"),
     )
-    written = overlay.write(black, *lines)
+    overlay.write(written, *lines)
     ink = written.min(axis=2) > 195  # the inside of letters, where nothing shines through
     assert ink[:, : SIZE[0] // 2].any()
     assert ink[:, SIZE[0] // 2 :].any()
@@ -124,8 +124,8 @@ def test_the_caption_says_when_and_how_well(
 @pytest.mark.parametrize("changed", range(4))
 def test_each_text_of_the_caption_is_in_its_corner(changed: int) -> None:
     def written(texts: list[str]) -> Pixels:
-        black = np.zeros((180, 320, 3), np.uint8)
-        frame = overlay.write(black, (texts[0], texts[1]), (texts[2], texts[3]))
+        frame = np.zeros((180, 320, 3), np.uint8)
+        overlay.write(frame, (texts[0], texts[1]), (texts[2], texts[3]))
         return frame.astype(np.int64)
 
     texts = ["name", "law", "1.00 s", "error 0.26 deg"]

@@ -19,19 +19,21 @@ class Recording:
     topics = {"/truth": {"error": (1,), "rate": (3,)}}  # noqa: RUF012
 
     def __init__(self, error: np.ndarray, rate: np.ndarray) -> None:
+        self.passes: list[dict[str, list[str]]] = []
         time = np.arange(len(error)) / 10.0
         self._rows = {"time": time, "error": error[:, None], "rate": rate}
 
-    def blocks(
-        self, topic: str, fields: list[str], start: float | None, end: float | None
-    ) -> Iterator[dict[str, np.ndarray]]:
+    def blocks_of_topics(
+        self, fields: dict[str, list[str]], start: float | None = None, end: float | None = None
+    ) -> Iterator[dict[str, dict[str, np.ndarray]]]:
+        self.passes.append(fields)
         time = self._rows["time"]
         for part in np.array_split(np.arange(len(time)), 2):
             inside = (time[part] >= (start or 0.0)) & (
                 time[part] <= (np.inf if end is None else end)
             )
             if inside.any():
-                yield {name: rows[part][inside] for name, rows in self._rows.items()}
+                yield {"/truth": {name: rows[part][inside] for name, rows in self._rows.items()}}
 
 
 ERROR = np.array([3.0, -5.0, 2.0, 1.0, 0.5, 0.25])
@@ -201,6 +203,20 @@ def test_a_target_of_the_wrong_length_is_refused() -> None:
 SMALL = EventTable(name="small", signal="truth.error", below=1.5, above=0.0)  # first at 0.3 s
 LOW = EventTable(name="low", signal="truth.error", below=0.7, above=0.0)  # first at 0.4 s
 NEVER = EventTable(name="never", signal="truth.error", above=10.0)
+
+
+def test_the_log_is_read_once_for_the_events_and_once_for_the_checks() -> None:
+    checks = [
+        Check(name="a", signal="truth.error", below=9.0, since="small"),
+        Check(name="b", signal="truth.rate", below=90.0, until="low"),
+        Check(name="c", signal="truth.rate[1]", below=9.0, start=0.5),
+    ]
+    recording = Recording(ERROR, RATE)
+    assert [v.measured for v in judge(recording, checks, [SMALL, LOW, NEVER])] == [1.0, 25.0, 0.0]
+    assert recording.passes == [
+        {"/truth": ["error", "error"]},
+        {"/truth": ["error", "rate", "rate"]},
+    ]
 
 
 def test_some_components_have_a_norm_of_their_own() -> None:

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from mjspace.runner.run import run
-from mjspace.scenario.loading import load, scenario_names, to_toml
+from mjspace.scenario.files import scenario_names
+from mjspace.scenario.loading import load, to_toml
 from mjspace.scenario.scenario import Check, Scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")

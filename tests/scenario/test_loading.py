@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from mjspace.errors import InputError
-from mjspace.scenario.loading import component, load, scenario_names, to_toml, validate
+from mjspace.scenario.files import scenario_names
+from mjspace.scenario.loading import component, load, to_toml, validate
 
 MINIMAL = """
 description = "nothing much"

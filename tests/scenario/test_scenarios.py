@@ -11,7 +11,8 @@ import pytest
 
 from mjspace.runner.checks import Verdict
 from mjspace.runner.run import Result, run
-from mjspace.scenario.loading import load, scenario_names
+from mjspace.scenario.files import scenario_names
+from mjspace.scenario.loading import load
 
 pytestmark = pytest.mark.filterwarnings("ignore::mjspace.vehicle.vehicle.UnphysicalInertiaWarning")
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mjspace.contract import Event
-from mjspace.scenario.loading import load, scenario_names
+from mjspace.scenario.files import scenario_names
+from mjspace.scenario.loading import load
 from mjspace.simulation import loop
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start

@@ -1,0 +1,60 @@
+"""What a start takes: each command as a process of its own, once and then ROUNDS times in turn.
+
+``python benchmarks/start.py [ROUNDS]``, 7 when left out. CPU is the processor time of all threads.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+
+MJSPACE = (sys.executable, "-m", "mjspace")
+RUN = (*MJSPACE, "run", "contraction-ideal", "--duration", "2", "--out")
+COMMANDS = {
+    "python alone": ((sys.executable, "-c", ""), None),
+    "import mjspace": ((sys.executable, "-c", "import mjspace"), 0.05),
+    "mjspace --help": ((*MJSPACE, "--help"), None),
+    "mjspace list": ((*MJSPACE, "list"), 0.3),
+    "mjspace info contraction-ideal": ((*MJSPACE, "info", "contraction-ideal"), 1.0),
+    "mjspace info dgvscmg-tracking": ((*MJSPACE, "info", "dgvscmg-tracking"), 1.0),
+    "mjspace run contraction-ideal --duration 2": (RUN, 2.0),
+}
+"""The words of each command, and its aim [s]."""
+
+
+def main() -> None:
+    """Print the table."""
+    rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 7
+    with tempfile.TemporaryDirectory() as folder:
+        words = {
+            name: (*command, folder) if command is RUN else command
+            for name, (command, _) in COMMANDS.items()
+        }
+        for command in words.values():
+            spent(command)
+        runs = [{name: spent(command) for name, command in words.items()} for _ in range(rounds)]
+    stored = Path(__file__).parents[1].glob("mjspace/__pycache__/*.pyc")
+    print(f"byte code {'stored' if any(stored) else 'not stored'}, medians of {rounds} [s]")
+    print(f"{'':46}{'wall':>7}{'CPU':>7}{'aim':>7}")
+    for name, (_, aim) in COMMANDS.items():
+        wall, processor = (median(run[name][i] for run in runs) for i in range(2))
+        print(f"{name:46}{wall:7.2f}{processor:7.2f}{'' if aim is None else f'{aim:7.2f}'}")
+
+
+def spent(command: Sequence[str]) -> tuple[float, float]:
+    """Return how long the command takes: wall time and processor time [s]."""
+    before, start = os.times(), time.perf_counter()
+    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    wall, after = time.perf_counter() - start, os.times()
+    if done.returncode > 1:  # 1: flown, but a check of the whole flight failed
+        raise SystemExit(f"{' '.join(command)}: exit status {done.returncode}")
+    used = after.children_user - before.children_user
+    return wall, used + after.children_system - before.children_system
+
+
+if __name__ == "__main__":
+    main()
