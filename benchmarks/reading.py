@@ -19,10 +19,8 @@ from mcap.reader import make_reader
 from mcap.records import Chunk
 
 import mjspace
-from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.plotting.panels import curves
-from mjspace.runner.checks import judge
 
 ROUNDS = 5
 
@@ -40,14 +38,12 @@ def main() -> None:
 def measure(path: Path) -> None:
     """Print the table of one log."""
     log = Log(path)
-    scenario = scenario_of(log)
     bare = decompressed(path)
     cases: dict[str, Callable[[], object]] = {
         "one field": lambda: list(map(len, log.blocks("/truth", ["rate"]))),
         "every field of every topic": lambda: list(
             map(len, log.blocks_of_topics(dict.fromkeys(log.topics)))
         ),
-        f"{len(scenario.checks)} checks": lambda: judge(log, scenario.checks, scenario.events),
         "the curves of a page": lambda: curves(log),
         "the digests": log.altered,
     }

@@ -51,15 +51,22 @@ LOG = (
 )
 VALIDATION = ("validation/test_suite.py", "validation/test_report.py", "cli/test_validate.py")
 GUARDS = {
+    "mjspace/log/background.py": ("log/test_background.py",),
     "mjspace/log/chunk.py": LOG,
     "mjspace/log/digest.py": LOG,
     "mjspace/log/file.py": LOG,
     "mjspace/log/index.py": LOG,
     "mjspace/log/encoding.py": LOG,
     "mjspace/log/reader.py": LOG,
+    "mjspace/log/rows.py": (*LOG, "runner/test_log_rates.py"),
     "mjspace/log/schema.py": LOG,
     "mjspace/log/writer.py": LOG,
-    "mjspace/runner/recorder.py": ("runner/test_recorder.py", "scenario/test_user_files.py"),
+    "mjspace/runner/flight_log.py": (
+        "runner/test_recorder.py",
+        "runner/test_log_rates.py",
+        "scenario/test_user_files.py",
+    ),
+    "mjspace/runner/recorder.py": ("runner/test_recorder.py",),
     "mjspace/simulation/recording.py": (
         "simulation/test_recording.py",
         "simulation/test_blocks.py",
@@ -72,6 +79,7 @@ GUARDS = {
         "scenario/test_user_files.py",
     ),
     "mjspace/runner/checks.py": ("runner/test_checks.py", "runner/test_verdict.py"),
+    "mjspace/runner/statistic.py": ("runner/test_checks.py",),
     "mjspace/runner/run.py": (
         "runner/test_verdict.py",
         "runner/test_run.py",

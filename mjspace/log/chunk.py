@@ -20,9 +20,9 @@ Nanoseconds = NDArray[np.uint64]
 INDEX = np.dtype([("time", "<u8"), ("offset", "<u8")])
 """An entry of a MessageIndex record."""
 
-# A satellite's rows (2.4 kB) on one core: level -5 packs them to 1/2.04 in 2.8 us and unpacks them
-# in 1.0; level 1 to 1/2.29 in 5.9 and 2.1; level -10 to 1/1.72 in 2.2 and 0.9.
-LEVEL = -5
+# 15 to 24 % smaller than level -5 for 1.2 to 1.9 us a row of the log's thread; level 1 takes 1.4 us
+# more for another 3 %. benchmarks/log_size.py
+LEVEL = -1
 
 
 class Part(NamedTuple):

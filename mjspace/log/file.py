@@ -1,8 +1,7 @@
-"""An MCAP file that grows by chunks, compressed and written by one background thread."""
+"""An MCAP file that grows by compressed chunks."""
 
-from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mcap.opcode import Opcode
@@ -28,12 +27,12 @@ MAGIC = b"\x89MCAP0\r\n"
 NAME = "mjspace"
 """Of the metadata record that every log of mjspace has."""
 
-# Chunks that may wait for the disk; beyond them the flight waits, so that memory is flat.
-_IN_FLIGHT = 2
-
 
 class LogFile:
-    """An MCAP file open for writing; the next call raises what went wrong in the background."""
+    """An MCAP file open for writing.
+
+    After a write that failed every other one fails with the same error.
+    """
 
     def __init__(
         self,
@@ -78,8 +77,6 @@ class LogFile:
         self._chunk_indexes = bytearray()
         self._error: OSError | None = None
         self._position = 0
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="log")
-        self._writing: deque[Future[None]] = deque()
         self._file = path.open("wb", buffering=0)
         try:
             self._put(head)
@@ -87,47 +84,30 @@ class LogFile:
             self._file.close()
             raise
 
-    def add_chunk(self, parts: Sequence[Part], then: Callable[[], None] = lambda: None) -> None:
-        """Have ``parts`` written as one chunk; waits when the disk is two chunks behind.
-
-        ``then`` is called by the thread that writes, after the chunk.
-        """
-        while self._writing and (self._writing[0].done() or len(self._writing) == _IN_FLIGHT):
-            self._writing.popleft().result()
-        self._writing.append(self._thread.submit(self._write_chunk, parts, then))
-
-    def flush(self) -> None:
-        """Wait until every chunk so far has been handed to the operating system."""
-        while self._writing:
-            self._writing.popleft().result()
+    def add_chunk(self, parts: Sequence[Part]) -> None:
+        """Compress ``parts`` and write them as one chunk."""
+        data, index, counts = encode(parts, self._position)
+        self._put(data)
+        self._chunk_indexes += record_bytes(index)
+        self._count(index, counts)
 
     def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
         """Write a metadata record after every chunk so far, unless the file is closed."""
         if self._file.closed:
             return
-        self.flush()
         record = record_bytes(Metadata(name, dict(metadata)))
         self._metadata_indexes.append(MetadataIndex(self._position, len(record), name))
         self._statistics.metadata_count += 1
         self._put(record)
 
     def close(self) -> None:
-        """Write what still waits and the summary, and close the file; again does nothing."""
+        """Write the summary and close the file; again does nothing."""
         if self._file.closed:
             return
         try:
-            self.flush()
             self._put(self._ending())
         finally:
-            self._thread.shutdown()
             self._file.close()
-
-    def _write_chunk(self, parts: Sequence[Part], then: Callable[[], None]) -> None:
-        data, index, counts = encode(parts, self._position)
-        self._put(data)
-        self._chunk_indexes += record_bytes(index)
-        self._count(index, counts)
-        then()
 
     def _count(self, index: ChunkIndex, counts: Mapping[int, int]) -> None:
         total = self._statistics

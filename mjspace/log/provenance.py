@@ -5,6 +5,7 @@ import platform
 import subprocess
 import sys
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -32,6 +33,7 @@ def metadata(scenario: Scenario, model: bytes, member: int) -> dict[str, str]:
     }
 
 
+@cache
 def software() -> dict[str, str]:
     """Return the versions of what computes, and where it does."""
     return {
@@ -42,6 +44,7 @@ def software() -> dict[str, str]:
     }
 
 
+@cache
 def _revision() -> str:
     """Return the source's git revision, '' where it is installed without one."""
     try:

@@ -21,9 +21,10 @@ from mjspace.log.schema import PERIODIC, field_names
 class Log:
     """A flight's log, whole or cut short: every chunk that was written completely is there.
 
-    Nothing stays open between calls. ``metadata``, ``complete`` (not cut short), ``topics`` (shapes
-    by periodic topic and field) and ``units`` (by topic and field, where one is declared) are read
-    at once, everything else when it is used.
+    Nothing stays open between calls. Read at once are ``metadata``, ``complete`` (not cut short),
+    ``topics`` (shapes by periodic topic and field), ``units`` (by topic and field, where one is
+    declared) and ``every`` (the number of control periods from one row of a topic to the next);
+    everything else is read when it is used.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -39,9 +40,11 @@ class Log:
         self.complete = found.complete
         self.topics: dict[str, dict[str, tuple[int, ...]]] = {}
         self.units: dict[str, dict[str, str]] = {}
+        self.every: dict[str, int] = {}
         for topic in PERIODIC:
             if topic in found.channels:
                 channel = found.channels[topic]
+                self.every[topic] = int(channel.metadata.get("every", 1))
                 names = field_names(found.schemas[channel.schema_id].data)
                 self.topics[topic] = {
                     name: tuple(
@@ -174,7 +177,8 @@ class Log:
             ValueError: the log has no such topic, no row, or a damaged chunk.
         """
         names = self._fields(topic, None)
-        places, stamp = self._found.chunks, round(time * 1e9)
+        channel, stamp = self._found.channels[topic].id, round(time * 1e9)
+        places = [p for p in self._found.chunks if p.indexes is None or channel in p.indexes]
         # The rows on either side are in the last chunk that starts before ``time``, the one before
         # it (an /events or /tf stamp may be all that starts it so early) or the one after it.
         after = bisect_right(places, stamp, key=lambda place: place.start)
@@ -217,9 +221,10 @@ class Log:
     @cached_property
     def _ends(self) -> tuple[np.void, np.void] | None:
         """Headers of the first and the last control period."""
-        topic, chunks = next(iter(self.topics), "/state"), self._found.chunks
-        for first in self._rows([topic], chunks):
-            last = next(self._rows([topic], reversed(chunks)))
+        # Of the topic that is logged most often: a log that was cut short ends with a row of that.
+        topic = min(self.every, key=self.every.__getitem__, default="/state")
+        for first in self._rows([topic], self._found.chunks):
+            last = next(self._rows([topic], reversed(self._found.chunks)))
             return first[topic]["header"][0], last[topic]["header"][-1]
         return None
 

@@ -43,12 +43,15 @@ class Scene(NamedTuple):
 
 
 def channels(
-    topics: Mapping[str, Fields], units: Mapping[str, Mapping[str, Unit]]
+    topics: Mapping[str, Fields],
+    units: Mapping[str, Mapping[str, Unit]],
+    every: Mapping[str, int] = {},
 ) -> tuple[list[Schema], list[Channel]]:
     """Return the records that declare ``topics``, then /tf, /scene, /events and /robot_description.
 
     A periodic channel's metadata has, of each field, ``shape.<field>`` ("9,9"; empty for a number)
-    and, where ``units`` has one, ``unit.<field>``.
+    and, where ``units`` has one, ``unit.<field>``; and ``every``, the number of control periods
+    from one row to the next, where that is not 1.
 
     Raises:
         ValueError: a topic that the log does not have.
@@ -70,6 +73,8 @@ def channels(
         metadata = {f"shape.{name}": ",".join(map(str, shape)) for name, shape in fields.items()}
         known = units.get(topic, {})
         metadata |= {f"unit.{name}": known[name].si for name in fields if name in known}
+        if every.get(topic, 1) != 1:
+            metadata["every"] = str(every[topic])
         declare(topic, PERIODIC[topic], "protobuf", _descriptor(PERIODIC[topic], fields), metadata)
     for topic, message in _FOXGLOVE.items():
         described = message.DESCRIPTOR

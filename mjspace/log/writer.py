@@ -1,6 +1,6 @@
 """Writing a log: blocks of control periods in, one MCAP file out."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from mjspace.contract import Array
 from mjspace.log.chunk import Nanoseconds, Part, block, message
 from mjspace.log.digest import RECORD, RowDigests
-from mjspace.log.encoding import Fields, doubles, side_by_side, transforms, varint5
+from mjspace.log.encoding import Fields, side_by_side, transforms, varint5
 from mjspace.log.file import LogFile
+from mjspace.log.rows import TopicGroup, due, stamp
 from mjspace.log.schema import Scene, channels
 from mjspace.units import Unit
 
@@ -21,9 +22,8 @@ from mjspace.units import Unit
 class LogWriter:
     """A log that grows by one chunk with each block of control periods.
 
-    A background thread compresses and writes. What it raises (``OSError`` on a full disk) is raised
-    by the next call; the file then keeps every chunk before that one, as it does when the process
-    is killed.
+    A full disk is an ``OSError``; the file then keeps every chunk before that one, as it does when
+    the process is killed.
     """
 
     def __init__(
@@ -34,26 +34,34 @@ class LogWriter:
         attachments: Mapping[str, tuple[str, bytes]],
         scene: Scene,
         units: Mapping[str, Mapping[str, Unit]],
+        every: Mapping[str, int] = {},
+        first: int = 0,
     ) -> None:
         """Create the file.
 
         ``topics`` gives each periodic topic's fields with their shapes, ``units`` the unit
         of some of them by topic and field; ``attachments`` are (media type, content) by name.
+        ``every`` says which control periods of a topic are logged, where not all: those whose
+        number it divides, the flight's first, which is number ``first``, and its last.
 
         Raises:
             OSError: the file cannot be written.
             ValueError: a topic or a field that the log cannot hold.
         """
-        schemas, declared = channels(topics, units)
-        self._topics = {topic: dict(fields) for topic, fields in topics.items()}
+        schemas, declared = channels(topics, units, every)
         self._channels = {channel.topic: channel.id for channel in declared}
-        records = {t: doubles(fields).record(self._channels[t]) for t, fields in topics.items()}
-        self._periods = side_by_side(records)
+        rates = {topic: every.get(topic, 1) for topic in topics}
+        self._groups = [
+            TopicGroup({t: f for t, f in topics.items() if rates[t] == rate}, self._channels, rate)
+            for rate in sorted(set(rates.values()))
+        ]
         self._frames = side_by_side({"/tf": transforms(scene.bodies).record(self._channels["/tf"])})
         self._scene = scene
+        self._first = first
         self._count = 0
         self._last = -1
         self._pending: list[Part] = []
+        self._last_rows: list[tuple[TopicGroup, NDArray[np.void]]] = []
         self._digests = RowDigests(topics)
         self._file = LogFile(path, schemas, declared, metadata, attachments)
 
@@ -63,31 +71,27 @@ class LogWriter:
         ``rows`` holds every field of every topic, shape (n, ...).
 
         Raises:
-            OSError: an earlier chunk could not be written.
+            OSError: the chunk cannot be written, or an earlier one could not.
             ValueError: a time not after the one before it, or a wrong shape.
         """
         count = len(time)
         stamps = nanoseconds(time)
         if self._last >= int(stamps[0]) or (stamps[1:] <= stamps[:-1]).any():
             raise ValueError(f"control periods from {time[0]:g} s on: times do not increase")
-        sequence = np.arange(self._count, self._count + count)
-        records = self._periods.rows(count)
-        for topic, fields in self._topics.items():
-            _stamp(records[topic], stamps, sequence)
-            columns = records[topic]["message"]
-            for field, shape in fields.items():
-                values = rows[topic][field]
-                if values.shape != (count, *shape):
-                    right = (count, *shape)
-                    raise ValueError(f"{topic}.{field}: shape {values.shape}, should be {right}")
-                columns[field] = values
         if not self._count:
             self._pending = [*self._scene_at(int(stamps[0])), *self._pending]
+        sequence = self._count + np.arange(count)
+        records = []
+        self._last_rows = []
+        for group in self._groups:
+            chosen = due(self._first, sequence, group.every)
+            records.append((group, group.records(stamps, sequence, rows, chosen)))
+            if sequence[-1] not in sequence[chosen]:
+                last = group.records(stamps, sequence, rows, slice(-1, None))
+                self._last_rows.append((group, last))
         self._count += count
         self._last = int(stamps[-1])
-        periodic = {topic: self._channels[topic] for topic in self._topics}
-        parts, self._pending = [block(records, periodic, stamps), *self._pending], []
-        self._file.add_chunk(parts, lambda: self._digests.add_rows(records))
+        self._add(records)
 
     def write_transforms(self, time: Array, positions: Array, quaternions: Array) -> None:
         """Log the scene's bodies in ``world`` on /tf, with the next chunk.
@@ -99,7 +103,7 @@ class LogWriter:
             return
         stamps = nanoseconds(time)
         records = self._frames.rows(len(time))
-        _stamp(records["/tf"], stamps, np.zeros(len(time), int))
+        stamp(records["/tf"], stamps, np.zeros(len(time), int))
         seconds, rest = (varint5(part) for part in np.divmod(stamps, np.uint64(1_000_000_000)))
         columns = records["/tf"]["message"]
         for i in range(len(self._scene.bodies)):
@@ -117,24 +121,24 @@ class LogWriter:
         self._pending.append(message(self._channels["/events"], stamp, entry.SerializeToString()))
 
     def flush(self) -> None:
-        """Wait until everything logged so far can be read from the file.
+        """Write what waits for the next chunk, so that it can be read from the file.
 
         Raises:
             OSError: something could not be written.
         """
-        parts, self._pending = self._pending, []
-        if parts:
-            self._file.add_chunk(parts)
-        self._file.flush()
+        self._add([])
 
     def close(self) -> None:
-        """Write what is pending and the summary, and close the file; again does nothing.
+        """Write each topic's last row, what is pending and the summary, and close the file.
+
+        Again it does nothing.
 
         Raises:
             OSError: something could not be written; the file is closed, and readable up to there.
         """
         try:
-            self.flush()
+            rows, self._last_rows = self._last_rows, []
+            self._add(rows)
             self._file.add_metadata(RECORD, self._digests.by_topic())
         finally:
             self._file.close()
@@ -153,6 +157,15 @@ class LogWriter:
         except OSError:
             if error is None:
                 raise
+
+    def _add(self, rows: Sequence[tuple[TopicGroup, NDArray[np.void]]]) -> None:
+        """Write ``rows`` and what is pending as a chunk, if there is anything."""
+        rows = [(group, records) for group, records in rows if len(records)]
+        parts, self._pending = [*(g.part(r) for g, r in rows), *self._pending], []
+        if parts:
+            self._file.add_chunk(parts)
+        for _, records in rows:
+            self._digests.add_rows(records)
 
     def _scene_at(self, stamp: int) -> list[Part]:
         text = self._scene.urdf.encode() + b"\0"
@@ -173,10 +186,3 @@ def nanoseconds(time: Array) -> Nanoseconds:
     if not (time >= 0.0).all():
         raise ValueError(f"times {time}: the log's clock starts at zero")
     return np.rint(time * 1e9).astype(np.uint64)
-
-
-def _stamp(records: NDArray[np.void], stamps: Nanoseconds, sequence: NDArray[np.int_]) -> None:
-    header = records["header"]
-    header["log_time"] = stamps
-    header["publish_time"] = stamps
-    header["sequence"] = sequence

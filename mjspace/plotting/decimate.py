@@ -32,10 +32,12 @@ def outlines(log: Log, lines: Sequence[Line], points: int = POINTS) -> list[tupl
     Raises:
         ValueError: the log has no such topic or field, or no row of it.
     """
-    rows_logged = round((log.end - log.start) / float(log.metadata["control_period"])) + 1
+    periods = round((log.end - log.start) / float(log.metadata["control_period"])) + 1
     # Two points for each stretch, in their order: a stretch of two rows is those two.
-    width = max(2, math.ceil(2 * rows_logged / points))
-    drawn = [_Outline(line, width) for line in lines]
+    drawn = [
+        _Outline(line, max(2, math.ceil(2 * periods / (points * log.every[line.topic]))))
+        for line in lines
+    ]
     for blocks in log.blocks_of_topics(by_topic((line.topic, line.field) for line in lines)):
         for outline in drawn:
             if outline.line.topic in blocks:

@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Mapping
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ def figure(log: Log, x: str, y: str) -> Figure:
     has_thrusters = bool(log.topics.get("/command", {}).get("on_time"))
     if has_thrusters:
         fields.setdefault("/command", []).append("on_time")
-    rows = log.read_topics(fields)
+    rows = _together(log.read_topics(fields))
     (across, x_label), (up, y_label) = (
         _values(log, rows, signal, place) for signal, place in zip((x, y), places, strict=True)
     )
@@ -84,6 +85,15 @@ def _component(log: Log, signal: str) -> tuple[str, str, int]:
             f"signal {signal!r} has {part.stop - part.start} numbers: pick one, as [0]"
         )
     return topic, field, part.start
+
+
+def _together(rows: Mapping[str, Mapping[str, Array]]) -> dict[str, dict[str, Array]]:
+    """Return the rows at the instants that every topic has: one may be logged less often."""
+    common = reduce(np.intersect1d, (columns["time"] for columns in rows.values()))
+    return {
+        topic: {n: c[np.searchsorted(columns["time"], common)] for n, c in columns.items()}
+        for topic, columns in rows.items()
+    }
 
 
 def _values(

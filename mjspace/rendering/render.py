@@ -72,7 +72,7 @@ def nearest_rows(log: Log, topic: str, field: str, times: Array) -> Iterator[Arr
     Raises:
         ValueError: the log does not have the topic or field, or no row near the times.
     """
-    margin = float(log.metadata["control_period"])
+    margin = float(log.metadata["control_period"]) * log.every[topic]
     stamps, rows, done = np.empty(0), np.empty((0, *log.topics[topic][field])), 0
     start, end = max(times[0] - margin, 0.0), times[-1] + margin
     for block in log.blocks(topic, [field], start=start, end=end):

@@ -7,12 +7,13 @@ from typing import Literal
 
 import numpy as np
 
-from mjspace.contract import TICK
+from mjspace.contract import TICK, Array
 from mjspace.errors import InputError, input_error_at
-from mjspace.log.reader import Log
 from mjspace.runner.statistic import Statistic
 from mjspace.scenario.scenario import Check, EventTable
-from mjspace.signals import Topics, by_topic, find_signal, magnitude
+from mjspace.signals import Topics, find_signal, magnitude
+
+Rows = Mapping[str, Mapping[str, Array]]
 
 Outcome = Literal["PASS", "FAIL", "not measured"]
 
@@ -22,7 +23,7 @@ NO_CRASH = Check(name="no crash", signal="truth.crash", statistic="max", below=0
 
 @dataclass(frozen=True)
 class Verdict:
-    """A check and what was measured from the log."""
+    """A check and what was measured in the flight."""
 
     check: Check
     measured: float
@@ -79,85 +80,79 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
             raise InputError(f"checks.{number}.target: {count} numbers, {check.signal} has {size}")
 
 
-def judge(log: Log, checks: Sequence[Check], events: Sequence[EventTable] = ()) -> list[Verdict]:
-    """Return the verdict of each check, from the log alone, one chunk of it in memory at a time.
+class Judge:
+    """The checks of one vehicle's flight, judged as it flies: on every control period.
 
     A vehicle over a ground is checked for ``NO_CRASH`` as well.
-
-    ``events`` are the scenario's, which checks may count from; one that never happened leaves
-    nothing to measure.
-
-    Raises:
-        ValueError: a check or an event names a signal that the log does not have.
     """
-    if "crash" in log.topics.get("/truth", {}):
-        own = any(check.signal == NO_CRASH.signal for check in checks)
-        checks = checks if own else [*checks, NO_CRASH]
-    named = [name for check in checks for name in (check.since, check.until) if name]
-    happened = _first_times(log, [event for event in events if event.name in named])
-    found = [
-        None if _never(check, happened) else Statistic(check, log.topics, *_window(check, happened))
-        for check in checks
-    ]
-    _gather(log, [statistic for statistic in found if statistic is not None])
-    return [
-        _verdict(check, statistic, happened) for check, statistic in zip(checks, found, strict=True)
-    ]
+
+    def __init__(
+        self, checks: Sequence[Check], events: Sequence[EventTable], topics: Topics
+    ) -> None:
+        """Begin a flight with these ``topics``.
+
+        ``events`` are the scenario's, which checks may count from; one that never happens leaves
+        nothing to measure.
+
+        Raises:
+            ValueError: a check or an event that it counts from names a signal that is not there.
+        """
+        if "crash" in topics.get("/truth", {}):
+            own = any(check.signal == NO_CRASH.signal for check in checks)
+            checks = checks if own else [*checks, NO_CRASH]
+        named = [name for check in checks for name in (check.since, check.until) if name]
+        self._events = {
+            e.name: (e, find_signal(topics, e.signal)) for e in events if e.name in named
+        }
+        self._happened = dict.fromkeys(self._events, math.nan)
+        self._measured = [
+            (check, find_signal(topics, check.signal), Statistic(check)) for check in checks
+        ]
+
+    def add(self, time: Array, rows: Rows) -> None:
+        """Go on with n > 0 control periods at ``time`` [s]; ``rows[topic][field]`` is (n, ...)."""
+        stamps = np.rint(time * 1e9)  # as they stand in the log
+        for name, (event, signal) in self._events.items():
+            if math.isnan(self._happened[name]):
+                inside = event.admits(magnitude(_numbers(rows, signal)))
+                if inside.any():
+                    self._happened[name] = float(stamps[np.argmax(inside)] / 1e9)
+        for check, signal, statistic in self._measured:
+            start, end = _window(check, self._happened)
+            low = np.searchsorted(stamps, np.rint(start * 1e9), "left")
+            high = np.searchsorted(stamps, np.rint(end * 1e9), "right")
+            if low < high:
+                statistic.add(_numbers(rows, signal)[low:high])
+
+    def verdicts(self) -> list[Verdict]:
+        """Return the verdict of each check on what has been flown so far."""
+        return [self._verdict(check, statistic) for check, _, statistic in self._measured]
+
+    def _verdict(self, check: Check, statistic: Statistic) -> Verdict:
+        for name in (check.since, check.until):
+            if name and math.isnan(self._happened[name]):
+                return Verdict(check, math.nan, f"event {name!r} never happened")
+        if not statistic.count:
+            start, end = _window(check, self._happened)
+            until = "the end" if end == math.inf else f"{end:.6g} s"
+            return Verdict(check, math.nan, f"no sample from {start:.6g} s to {until}")
+        measured = statistic.value()
+        missing = f"{check.signal} is not a number" if math.isnan(measured) else ""
+        return Verdict(check, measured, missing)
 
 
-def _first_times(log: Log, events: Sequence[EventTable]) -> dict[str, float]:
-    """Return when each event's signal is in its region first [s], by its name; nan if never."""
-    happened = {event.name: math.nan for event in events}
-    signals = {event.name: find_signal(log.topics, event.signal) for event in events}
-    fields = by_topic((topic, field) for topic, field, _ in signals.values())
-    for blocks in log.blocks_of_topics(fields) if events else ():
-        for event in events:
-            topic, field, part = signals[event.name]
-            if topic not in blocks or not math.isnan(happened[event.name]):
-                continue
-            block = blocks[topic]
-            rows = block[field].reshape(len(block["time"]), -1)
-            inside = event.admits(magnitude(rows[:, part]))
-            if inside.any():
-                happened[event.name] = float(block["time"][np.argmax(inside)])
-        if not any(map(math.isnan, happened.values())):
-            break
-    return happened
-
-
-def _gather(log: Log, statistics: Sequence[Statistic]) -> None:
-    """Read the log once, as far as one of the windows reaches."""
-    if not statistics:
-        return
-    start, end = min(s.start for s in statistics), max(s.end for s in statistics)
-    fields = by_topic((s.topic, s.field) for s in statistics)
-    for blocks in log.blocks_of_topics(fields, start, None if end == math.inf else end):
-        for statistic in statistics:
-            if statistic.topic in blocks:
-                statistic.add(blocks[statistic.topic])
-
-
-def _verdict(check: Check, statistic: Statistic | None, happened: Mapping[str, float]) -> Verdict:
-    if statistic is None:
-        return Verdict(check, math.nan, f"event {_never(check, happened)!r} never happened")
-    if statistic.count == 0:
-        until = "the end" if statistic.end == math.inf else f"{statistic.end:.6g} s"
-        return Verdict(check, math.nan, f"no sample from {statistic.start:.6g} s to {until}")
-    measured = statistic.value
-    return Verdict(
-        check, measured, f"{check.signal} is not a number" if math.isnan(measured) else ""
-    )
-
-
-def _never(check: Check, happened: Mapping[str, float]) -> str:
-    """Return the first event that the check counts from and that never happened; else ''."""
-    named = (name for name in (check.since, check.until) if name)
-    return next((name for name in named if math.isnan(happened[name])), "")
+def _numbers(rows: Rows, signal: tuple[str, str, slice]) -> Array:
+    """Return the signal's numbers (n, k)."""
+    topic, field, part = signal
+    values = rows[topic][field]
+    return values.reshape(len(values), -1)[:, part]
 
 
 def _window(check: Check, happened: Mapping[str, float]) -> tuple[float, float]:
-    """Return the check's first and last instant [s]."""
+    """Return the check's first and last instant [s], as far as what ``happened`` tells them."""
     zero = happened[check.since] if check.since else 0.0
-    end = math.inf if check.end is None else zero + check.end
     before = happened[check.until] - TICK if check.until else math.inf
-    return zero + check.start, min(end, before)
+    if math.isnan(zero):
+        return math.inf, -math.inf
+    end = math.inf if check.end is None else zero + check.end
+    return zero + check.start, end if math.isnan(before) else min(end, before)

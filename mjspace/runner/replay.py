@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.contract import REPORTED_BY_PLANT
+from mjspace.contract import REPORTED_BY_PLANT, TICK, Array
 from mjspace.errors import InputError, input_error_at
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
@@ -111,11 +111,11 @@ def verify(
             flown = one_vehicle(block)
             _check_topics(log, block)
             logged = log.read_topics(dict.fromkeys(flown), start=block.time[0], end=block.time[-1])
-            found = first_difference(logged, flown)
+            found = first_difference(logged, _as_often(log, logged, flown, block.time))
             if found is not None:
                 return dataclasses.replace(found, reason=_other_streams(log, assembly.scenario))
             progress(float(block.time[-1]))
-            if len(logged["/state"]["time"]) < len(block.time):
+            if block.time[-1] > log.end + TICK:
                 break  # the log ends here: its flight was interrupted
     return None
 
@@ -202,7 +202,14 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     near = (number - 0.5) * period, (number + 0.5) * period
     row = log.read("/state", None, *near)
     if len(row["time"]) != 1:
-        raise InputError(f"t = {time:g} s is not in the log: it has {log.start:g} to {log.end:g} s")
+        if not log.start <= time <= log.end:
+            has = f"{log.start:g} to {log.end:g} s"
+            raise InputError(f"t = {time:g} s is not in the log: it has {has}")
+        found = float(log.nearest("/state", time)["time"])
+        raise InputError(
+            f"t = {time:g} s has no logged state: /state is logged every "
+            f"{log.every['/state'] * period:g} s, and the nearest is at {found:.10g} s"
+        )
     state = {name: values for name, values in row.items() if name != "time"}
     sensors, actuators = (
         {name.removeprefix(kind): v for name, v in state.items() if name.startswith(kind)}
@@ -211,8 +218,9 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
     law_state: Any = None
     if not fresh_law:
         absent = dict.fromkeys(REPORTED_BY_PLANT, np.empty((1, 0)))
-        logged = log.read("/measurement", None, *near)
-        measured = {name: values for name, values in logged.items() if name != "time"}
+        # Whichever is logged: the law's state is taken from the log, its names from this one.
+        logged = log.nearest("/measurement", time)
+        measured = {name: values[None] for name, values in logged.items() if name != "time"}
         desired = reference_at(assembly.reference, np.array([number * period]))
         template = assembly.law.reset(
             assembly.sensors([0]).measurement(**absent | measured),
@@ -235,6 +243,17 @@ def _check_topics(log: Log, block: Block) -> None:
                 f"log: {topic} holds {log.topics.get(topic)}, flown again {flown.get(topic)}: "
                 "another version of mjspace wrote it"
             )
+
+
+def _as_often(log: Log, logged: Rows, flown: Rows, time: Array) -> Rows:
+    """Return the rows of ``flown``, at ``time`` (n,) [s], that each topic has ``logged``."""
+    found = {}
+    for topic, fields in flown.items():
+        chosen: Any = slice(None)
+        if log.every[topic] > 1:
+            chosen = np.searchsorted(time, logged[topic]["time"] - TICK)
+        found[topic] = {name: rows[chosen] for name, rows in fields.items()}
+    return found
 
 
 def first_difference(logged: Rows, flown: Rows) -> Difference | None:

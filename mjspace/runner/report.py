@@ -85,6 +85,7 @@ def log_data(log: Log) -> dict[str, Any]:
             for topic, fields in log.topics.items()
         },
         "units": log.units,
+        "every": log.every,
         "attachments": sorted(log.attachments),
         "events": [
             {"time": time, "level": level, "message": message}
@@ -107,7 +108,10 @@ def print_log(log: Log) -> None:
         for name, shape in fields.items():
             size = "x".join(map(str, shape)) or "1"
             listed.append(f"{name} {size}" + (f" [{units[name]}]" if name in units else ""))
-        table.add_row(topic, escape(", ".join(listed)))
+        often = ""
+        if log.every[topic] > 1:
+            often = f"every {log.every[topic] * float(log.metadata['control_period']):g} s: "
+        table.add_row(topic, escape(often + ", ".join(listed)))
     table.add_row("attachments", ", ".join(sorted(log.attachments)))
     altered = log.altered()
     if altered is not None:

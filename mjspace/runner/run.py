@@ -1,4 +1,4 @@
-"""A flight from scenario to verdict: fly it, log it as it flies, judge the log."""
+"""A flight from scenario to verdict: fly it, and log and judge it as it flies."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mjspace.errors import FlightError
 from mjspace.log.reader import Log
-from mjspace.runner.checks import Verdict, judge, refuse_unknown
+from mjspace.runner.checks import Verdict, refuse_unknown
 from mjspace.runner.interrupts import on_signals
 from mjspace.runner.recorder import Recorder
 from mjspace.scenario.loading import load
@@ -92,24 +92,23 @@ def fly_to_log(
     """
     start = start or first_start(assembly, [member])
     trouble, ended_by = "", None
-    with on_signals() as stop:
+    with on_signals() as stop, Recorder(assembly) as recorder:
         blocks = fly(assembly, start, [member], stop=stop)
         first = next(blocks)
         refuse_unknown(assembly.scenario.checks, shapes(first))
         path.parent.mkdir(parents=True, exist_ok=True)
-        with Recorder(assembly, path, member, first) as recorder:
-            try:
-                for block in chain([first], blocks):
-                    recorder.write(block)
-                    progress(float(block.time[-1]))
-            except FlightError as error:
-                trouble, ended_by = str(error), error
-            if stop():
-                trouble = f"interrupted by signal {stop.signal} at t = {recorder.time:.6g} s"
-            if trouble:
-                recorder.event("ERROR", trouble)
-            recorder.flush()
-            verdicts = judge(Log(path), assembly.scenario.checks, assembly.scenario.events)
-            for verdict in verdicts:
-                recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
+        recorder.begin(path, member, first)
+        try:
+            for block in chain([first], blocks):
+                recorder.write(block)
+                progress(float(block.time[-1]))
+        except FlightError as error:
+            trouble, ended_by = str(error), error
+        if stop():
+            trouble = f"interrupted by signal {stop.signal} at t = {recorder.time:.6g} s"
+        if trouble:
+            recorder.event("ERROR", trouble)
+        verdicts = recorder.verdicts()
+        for verdict in verdicts:
+            recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
     return Result(path, verdicts, trouble, stop.signal, ended_by)

@@ -55,6 +55,19 @@ class Si(Unit):
         return {**handler(schema), "unit": self.si}
 
 
+@dataclass(frozen=True)
+class Interval(Si):
+    """A period [s]; a frequency does too: ``"100 Hz"`` is 0.01 s."""
+
+    def _validated(self, value: Any, inner: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        if isinstance(value, str) and value.endswith("Hz"):
+            frequency = to_si(value, "Hz")
+            if frequency <= 0.0:
+                raise ValueError(f"got {value!r}, should be greater than 0")
+            value = 1.0 / frequency
+        return super()._validated(value, inner)
+
+
 def of_form(form: Form) -> AfterValidator:
     """Return what refuses an array that is not of that form."""
 

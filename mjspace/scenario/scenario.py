@@ -18,6 +18,7 @@ from mjspace.ranges import numbers
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
+from mjspace.scenario.log_rates import LogRates
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
 from mjspace.scenario.sensors import Sensors, check_sensors
@@ -55,7 +56,7 @@ class EventTable(SignalRegion):
 
 
 class Check(SignalRegion):
-    """One thing that the flight must show, judged from the log alone."""
+    """One thing that the flight must show, judged on every control period."""
 
     statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
     """Over the window: of the value, or of the norm of a vector; ``peak`` is the largest magnitude,
@@ -167,6 +168,7 @@ class Scenario(Table):
     faults: list[Annotated[Any, DeclaredIn("mjspace.actuators.faults:Fault", optional=False)]] = []
     checks: list[Check] = []
     events: list[EventTable] = []
+    log: LogRates = LogRates()
 
     @model_validator(mode="before")
     @classmethod
@@ -210,6 +212,7 @@ class Scenario(Table):
                 whole_number(span, step, key, "rates.physics")
         if not _is_flown(info):
             whole_number(self.duration, self.rates.control, "duration", "rates.control")
+        self.log.every(self.rates.control)
         return self
 
     @model_validator(mode="after")

@@ -163,15 +163,20 @@ def _set_joints(model: Any, data: Any, initial: Initial) -> None:
         data.qvel[model.jnt_dofadr[known[name]]] = value
 
 
-def to_bytes(model: Any) -> bytes:
-    """Return the compiled model as gzipped MJB: equal models give equal bytes."""
+def to_mjb(model: Any) -> bytes:
+    """Return the compiled model as MJB: equal models give equal bytes."""
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
-    return gzip.compress(buffer.tobytes(), compresslevel=3, mtime=0)
+    return buffer.tobytes()
+
+
+def packed(mjb: bytes) -> bytes:
+    """Return a compiled model gzipped: equal models give equal bytes."""
+    return gzip.compress(mjb, compresslevel=3, mtime=0)
 
 
 def from_bytes(data: bytes) -> Any:
-    """Return the ``mujoco.MjModel`` that ``to_bytes`` wrote."""
+    """Return the ``mujoco.MjModel`` that was ``packed``."""
     return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": gzip.decompress(data)})
 
 

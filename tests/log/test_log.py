@@ -2,7 +2,6 @@
 
 import tracemalloc
 from pathlib import Path
-from time import sleep
 from typing import Any
 
 import numpy as np
@@ -10,17 +9,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from log_samples import ATTACHMENTS, BLOCKS, METADATA, create, fly, rows, write_block
-from mcap.reader import NonSeekingReader, make_reader
-from mcap.records import Channel, Schema
-from mcap.stream_reader import StreamReader
+from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from mjspace.contract import Array
 from mjspace.log import reader
-from mjspace.log.chunk import encode, message
 from mjspace.log.content import Content, read_content
 from mjspace.log.encoding import Fields, doubles, varint5
-from mjspace.log.file import LogFile
 from mjspace.log.reader import Log
 from mjspace.log.schema import PERIODIC, Scene
 from mjspace.log.writer import LogWriter
@@ -240,55 +235,6 @@ def test_reading_by_chunks_never_holds_the_log(tmp_path: Path) -> None:
 
     # 40 blocks of 0.4 MB; the peaks differ by what happens to be in flight, two blocks at most.
     assert peak(50) - peak(10) < 1_000_000
-
-
-def test_a_slow_disk_holds_up_the_flight_and_not_its_memory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    written = 0
-    ahead: list[int] = []
-
-    def slow(parts: Any, position: int) -> Any:
-        done = len(ahead)
-        for _ in range(2000):  # as slow as it takes for the flight to be two chunks ahead
-            if written >= min(done + 2, 8):
-                break
-            sleep(0.005)
-        sleep(0.005)  # and to go further, if it may
-        ahead.append(written - done)
-        return encode(parts, position)
-
-    monkeypatch.setattr("mjspace.log.file.encode", slow)
-    with create(tmp_path / "flight.mcap") as log:
-        for i in range(8):
-            write_block(log, 10 * i, 10)
-            written += 1
-    assert ahead == [2, 2, 2, 2, 2, 2, 2, 1]
-
-
-def test_a_slow_chunk_is_not_overtaken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor by what comes after all chunks: a file that is closed at once waits for them."""
-    begun: list[int] = []
-
-    def slow(parts: Any, position: int) -> Any:
-        begun.append(position)
-        sleep(0.1 if len(begun) == 1 else 0.0)
-        return encode(parts, position)
-
-    monkeypatch.setattr("mjspace.log.file.encode", slow)
-    path = tmp_path / "flight.mcap"
-    file = LogFile(path, [Schema(1, b"", "", "")], [Channel(1, "/a", "", {}, 1)], {}, {})
-    for k in range(2):
-        file.add_chunk([message(1, k, bytes(8))])
-    file.add_metadata("last", {})
-    file.add_chunk([message(1, 2, bytes(8))])
-    file.close()
-    with path.open("rb") as stream:
-        assert [m.log_time for *_, m in NonSeekingReader(stream).iter_messages(None)] == [0, 1, 2]
-        stream.seek(0)
-        kinds = [type(r).__name__ for r in StreamReader(stream, emit_chunks=True).records]
-    order = [kind for kind in kinds if kind in ("Chunk", "Metadata")]
-    assert order == ["Metadata", "Chunk", "Chunk", "Metadata", "Chunk"]
 
 
 @pytest.mark.parametrize(

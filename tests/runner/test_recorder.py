@@ -1,5 +1,7 @@
 """The log of a flight against what flew: every topic against its own source, and their units."""
 
+import resource
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from time import sleep
@@ -15,11 +17,17 @@ from mjspace.contract import Measurement, Reference
 from mjspace.log import topics
 from mjspace.log.chunk import encode
 from mjspace.log.reader import Log
+from mjspace.runner import flight_log
+from mjspace.runner.recorder import AHEAD
 from mjspace.runner.replay import assembly_of
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
 from mjspace.simulation import loop
-from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.initial_state import first_start
+from mjspace.simulation.loop import fly
+from mjspace.simulation.recording import Block
+from mjspace.vehicle import vehicle
 from mjspace.vehicle.vehicle import from_bytes
 
 OVERRIDES = [
@@ -145,15 +153,120 @@ def test_the_verdict_stands_at_the_end_of_the_log(log: Log) -> None:
     assert log.complete
 
 
-def test_a_verdict_waits_for_a_slow_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Blocks of 8 periods, written only when the flight is as far ahead as it may be.
+
+    Returns, for each chunk, how many blocks the flight had flown then.
+    """
+    flown = 0
+    seen: list[int] = []
+
+    def counted(*arguments: Any, **options: Any) -> Iterator[Block]:
+        nonlocal flown
+        for block in loop.fly(*arguments, **options):
+            flown += 1
+            yield block
+        flown = 10**9
+
     def slow(parts: Any, position: int) -> Any:
-        sleep(0.1)
+        for _ in range(2000):  # 10 s
+            if flown > len(seen) + AHEAD:
+                break
+            sleep(0.005)
+        sleep(0.005)  # and to go further, if it may
+        seen.append(flown)
         return encode(parts, position)
 
+    monkeypatch.setattr(loop, "BLOCK_PERIODS", 8)
+    monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
+    monkeypatch.setattr("mjspace.runner.run.fly", counted)
     monkeypatch.setattr("mjspace.log.file.encode", slow)
-    check = "checks=[{name='turns',signal='truth.rate',below=9}]"
-    flown = run("detumble-wheels", overrides=["duration=0.02", "events=[]", check], out=tmp_path)
-    assert [verdict.line[:11] for verdict in flown.verdicts] == ["PASS turns:"]
+    return seen
+
+
+TURNS = "checks=[{name='turns',signal='truth.rate[0]',statistic='final',below=9}]"
+SHORT = ["duration=0.2", "events=[]", TURNS]  # 41 periods of 5 ms, 6 blocks
+
+
+def test_a_slow_disk_holds_up_the_flight_and_not_its_memory(
+    slow_disk: list[int], tmp_path: Path
+) -> None:
+    """With a block being written and one that waits, the flight has flown one more at most."""
+    run("detumble-wheels", overrides=SHORT, out=tmp_path)
+    assert slow_disk[:3] == [3, 4, 5]
+
+
+def test_what_a_slow_disk_gets_is_what_flew_and_was_judged(
+    slow_disk: list[int], tmp_path: Path
+) -> None:
+    flown = run("detumble-wheels", overrides=SHORT, out=tmp_path)
+    assembly = assemble(*load("detumble-wheels", SHORT))
+    begin = first_start(assembly, [0])
+    blocks = [block.rows["/state"]["physics"].copy() for block in fly(assembly, begin)]
+    physics = flown.log.read("/state", ["physics"])["physics"]
+    assert physics.tobytes() == np.concatenate(blocks)[:, 0].tobytes()
+    (verdict,) = flown.verdicts
+    assert verdict.measured == flown.log.read("/truth", ["rate"])["rate"][-1, 0]
+    assert flown.log.events()[-1].message == verdict.line
+
+
+@pytest.mark.parametrize("periods", [24, 41], ids=["in a chunk", "in the summary"])
+def test_a_disk_that_fills_up_ends_the_flight_and_what_fitted_is_kept(
+    periods: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "BLOCK_PERIODS", 8)
+    whole = run("detumble-wheels", overrides=SHORT, out=tmp_path / "whole").path
+    with whole.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    fourth = summary.chunk_indexes[3].chunk_start_offset
+    room = fourth + 100 if periods == 24 else whole.stat().st_size - 1
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            run("detumble-wheels", overrides=SHORT, out=tmp_path / "full")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    log = Log(tmp_path / "full/flight.mcap")
+    assert (log.complete, len(log)) == (False, periods)
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("log")]
+
+
+def test_a_log_that_cannot_be_begun_ends_the_flight(tmp_path: Path) -> None:
+    (tmp_path / "flight.mcap").mkdir()
+    with pytest.raises(IsADirectoryError):
+        run("detumble-wheels", overrides=SHORT, out=tmp_path)
+
+
+def test_flights_of_one_model_compress_and_describe_it_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+
+    def counted(module: Any, name: str) -> None:
+        function = getattr(module, name)
+
+        def call(what: Any) -> Any:
+            done.append(name)
+            return function(what)
+
+        monkeypatch.setattr(module, name, call)
+
+    counted(vehicle, "packed")
+    counted(flight_log, "scene")
+    heavier = "plant.gyrostat_inertia=[[16, 0, 0], [0, 12, 0], [0, 0, 18]]"
+    models = {}
+    for number, change in enumerate(([], [], [heavier])):
+        flown = run("detumble-wheels", overrides=[*SHORT, *change], out=tmp_path / str(number))
+        models[number] = flown.log.attachment("model.mjb.gz")
+        if number == 0:
+            done.clear()  # the model may be that of an earlier flight
+        if number == 1:
+            assert done == []
+    assert done == ["packed", "scene"]
+    assert models[0] == models[1] != models[2]
 
 
 DIMENSIONLESS = {"attitude", "contact", "foot_contact", "hull_contact", "crash", "time"}

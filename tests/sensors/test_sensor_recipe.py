@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mjspace.runner.recorder import units_of
+from mjspace.runner.flight_log import units_of
 from mjspace.scenario import sensors
 from mjspace.scenario.loading import load, to_toml, validate
 from mjspace.simulation.assembly import assemble

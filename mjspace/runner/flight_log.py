@@ -1,0 +1,121 @@
+"""A flight's log: what describes the flight, and blocks of control periods."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import mujoco
+import numpy as np
+
+from mjspace.log import foxglove_layout, provenance, topics
+from mjspace.log.rows import due
+from mjspace.log.scene import scene
+from mjspace.log.schema import Scene
+from mjspace.log.writer import LogWriter
+from mjspace.scenario.loading import to_toml
+from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.recording import Block, one_vehicle, shapes
+from mjspace.units import Unit
+from mjspace.vehicle import vehicle
+
+_described: dict[bytes, tuple[bytes, Scene]] = {}
+"""Of the last model, 10 MB."""
+
+
+def units_of(assembly: Assembly, kinds: Mapping[str, type] = {}) -> dict[str, dict[str, Unit]]:
+    """Return the unit of each logged field by topic, as contract, law, actuators and sensors say.
+
+    ``kinds`` are the named tuples that the flight records, by topic.
+    """
+    units = topics.units(kinds)
+    for topic, declared in assembly.actuators.units.items():
+        units[topic] |= {name: Unit(unit) for name, unit in declared.items()}
+    for name, sensor in assembly.scenario.sensors.items():
+        if sensor.unit:
+            units["/measurement"].setdefault(name, Unit(sensor.unit))
+            units["/truth"].setdefault(sensor.measures, Unit(sensor.unit))
+    return units
+
+
+class FlightLog:
+    """The open log of one vehicle's flight; a context manager."""
+
+    def __init__(self, assembly: Assembly, path: Path, member: int, first: Block) -> None:
+        """Create the log at ``path``; ``first`` is the flight's first block, for its shapes.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        scenario, self._model = assembly.scenario, assembly.vehicle.model
+        self._data = mujoco.MjData(self._model)
+        self._every = scenario.log.every(scenario.rates.control)
+        self._first = first.period
+        compiled, drawn = described(self._model)
+        attachments = {
+            "model.mjb.gz": ("application/gzip", compiled),
+            "scenario.toml": ("application/toml", to_toml(scenario).encode()),
+            "foxglove_layout.json": ("application/json", foxglove_layout.layout()),
+        }
+        for name, content in assembly.sources.items():
+            is_code = name.endswith(".py")
+            media_type = "text/x-python" if is_code else "application/octet-stream"
+            attachments[name] = (media_type, content)
+        self._log = LogWriter(
+            path,
+            shapes(first),
+            provenance.metadata(scenario, compiled, member),
+            attachments,
+            drawn,
+            units_of(assembly, first.kinds),
+            self._every,
+            self._first,
+        )
+
+    def write(self, block: Block) -> None:
+        """Log a block of a flight of one vehicle.
+
+        Raises:
+            OSError: the log cannot be written (any more).
+        """
+        rows = one_vehicle(block)
+        # What goes into a chunk beside the periods must be handed over before them.
+        self._write_frames(block, rows["/state"]["physics"])
+        for time, _, level, text in block.events:
+            self._log.event(time, level, text)
+        self._log.write(block.time, rows)
+
+    def event(self, time: float, level: str, text: str) -> None:
+        """Log ``text`` at ``time`` [s]; ``level`` is INFO, WARNING or ERROR."""
+        self._log.event(time, level, text)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self._log.close()
+
+    def _write_frames(self, block: Block, physics: np.ndarray) -> None:
+        sequence = block.period - self._first + np.arange(len(block.time))
+        chosen = due(self._first, sequence, self._every["/tf"])
+        time, states = block.time[chosen], physics[chosen]
+        positions = np.empty((len(time), self._model.nbody - 1, 3))
+        quaternions = np.empty((len(time), self._model.nbody - 1, 4))
+        for i, state in enumerate(states):
+            mujoco.mj_setState(self._model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+            mujoco.mj_kinematics(self._model, self._data)
+            positions[i], quaternions[i] = self._data.xpos[1:], self._data.xquat[1:]
+        self._log.write_transforms(time, positions, quaternions)
+
+
+def described(model: Any) -> tuple[bytes, Scene]:
+    """Return a compiled model as it is attached, and what viewers draw of it.
+
+    It is done once for consecutive flights of one model in a process.
+    """
+    mjb = vehicle.to_mjb(model)
+    found = _described.get(mjb)
+    if found is None:
+        found = vehicle.packed(mjb), scene(model)
+        _described.clear()
+        _described[mjb] = found
+    return found
