@@ -27,7 +27,10 @@ HERE = Path(__file__).parent
 PYTHON = HERE.parent / "build/basilisk/bin/python"
 EVERY = 1000  # steps between compared rows, as in basilisk_wheels.py
 LARGEST = 1e-10  # of the difference, in any component of the motion
-ELEMENTS = ["semi_major_axis", "eccentricity", "inclination", "ascending_node", "periapsis", "true_anomaly"]
+ELEMENTS = (
+    *("semi_major_axis", "eccentricity", "inclination"),
+    *("ascending_node", "periapsis", "true_anomaly"),
+)
 
 
 def main() -> None:
@@ -43,36 +46,27 @@ def main() -> None:
         return
     craft = built(HERE / "three_wheels.toml")
     command = [python, str(HERE / "basilisk_wheels.py")]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as child:
-        assert child.stdin is not None and child.stdout is not None
 
-        def theirs(recorded: bool) -> dict[str, Any]:
-            child.stdin.write(json.dumps(vehicle(craft) | {"logged": recorded}) + "\n")
-            child.stdin.flush()
-            line = child.stdout.readline()
-            while not line.startswith("{"):
-                if not line:
-                    raise SystemExit("Basilisk ended before its flight did")
-                line = child.stdout.readline()
-            answer: dict[str, Any] = json.loads(line)
-            return answer
+    def theirs(recorded: bool) -> dict[str, Any]:
+        request = json.dumps(vehicle(craft) | {"logged": recorded}) + "\n"
+        done = subprocess.run(command, input=request, capture_output=True, text=True, check=True)
+        answer: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
+        return answer
 
-        off = difference(craft, theirs(True))
-        if not off < LARGEST:
-            raise SystemExit(f"the motions differ by {off:.1e}: no time is compared")
-        head("wall time of a step [us]", "mjspace", "Basilisk", "ratio", "aim")
-        steps = steps_of(craft)
-        for name, recorded, aim in (("both log", True, "0.59"), ("neither logs", False, "")):
-            run = logged(craft) if recorded else flight(craft)
-            times = alternating(
-                lambda run=run: seconds(run),  # type: ignore[misc]
-                lambda recorded=recorded: theirs(recorded)["seconds"],  # type: ignore[misc]
-            )
-            each = 1e6 * np.median(times, axis=0) / steps
-            row(name, *(f"{us:.1f}" for us in each), f"{ratio(times):.2f}", aim)
-        print(f"\nThe motions differ by at most {off:.0e} (MRP, rad/s, relative wheel speed).")
-        child.stdin.close()
+    off = difference(craft, theirs(True))
+    if not off < LARGEST:
+        raise SystemExit(f"the motions differ by {off:.1e}: no time is compared")
+    head("wall time of a step [us]", "mjspace", "Basilisk", "ratio", "aim")
+    steps = steps_of(craft)
+    for name, recorded, aim in (("both log", True, "0.59"), ("neither logs", False, "")):
+        run = logged(craft) if recorded else flight(craft)
+        times = alternating(
+            lambda run=run: seconds(run),  # type: ignore[misc]
+            lambda recorded=recorded: theirs(recorded)["seconds"],  # type: ignore[misc]
+        )
+        each = 1e6 * np.median(times, axis=0) / steps
+        row(name, *(f"{us:.1f}" for us in each), f"{ratio(times):.2f}", aim)
+    print(f"\nThe motions differ by at most {off:.0e} (MRP, rad/s, relative wheel speed).")
 
 
 def vehicle(craft: Assembly) -> dict[str, Any]:
