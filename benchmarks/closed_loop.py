@@ -1,108 +1,132 @@
-"""What the loop costs: a flight over bare ``mj_step`` of the same model, in one run.
+"""What the loop costs: a flight over bare steps of the same model, in one run.
 
-Each figure is the median of the ratios of neighbouring runs, so that a machine that slows down or
-speeds up meanwhile changes both sides. ``python benchmarks/closed_loop.py``
+``python benchmarks/closed_loop.py [WORDS]``: the rows whose name has any of the words; all, when
+left out. Bare is a loop in Python of ``mj_step``, or of ``Batch.step`` for many vehicles.
 """
 
+import subprocess
+import sys
 import tempfile
-import time
 import warnings
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
+from typing import NamedTuple
 
-import mujoco
 import numpy as np
-from mujoco.batch import Batch
+import own_law as own
+from flights import Run, bare_batch, bare_steps, built, flight, logged, steps_of
+from timing import head, paired, ratio, row
 
-from mjspace.runner.run import fly_to_log
-from mjspace.scenario.loading import load
-from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.simulation.initial_state import first_start
-from mjspace.simulation.loop import fly
+from mjspace.contract import Law, Measurement, Reference
+from mjspace.simulation.assembly import Assembly
 
-ROUNDS = 5
+OWN_LAW = Path(__file__).parent / "three_wheels.toml"
+
+
+class Case(NamedTuple):
+    """A row of the table."""
+
+    name: str
+    scenario: str | Path
+    changes: tuple[str, ...] = ()
+    logged: bool = True
+    aim: str = ""
+
+
+SLOW = "rates.control='10 ms'"
+CASES = (
+    Case("contraction-adaptive, 1 kHz", "contraction-adaptive", ("duration=60",), logged=False),
+    Case("contraction-adaptive, 1 kHz", "contraction-adaptive", ("duration=60",), aim="1.5"),
+    Case("the same, law at 100 Hz", "contraction-adaptive", ("duration=60", SLOW), logged=False),
+    Case("the same, law at 100 Hz", "contraction-adaptive", ("duration=60", SLOW), aim="1.15"),
+    Case("dgvscmg-tracking, 10 kHz drives", "dgvscmg-tracking", ("duration=5",), logged=False),
+    Case("dgvscmg-tracking, 10 kHz drives", "dgvscmg-tracking", ("duration=5",), aim="1.5"),
+    Case("lander, burning tank", "lander", ("duration=20",), aim="1.5"),
+    Case("rcs-schmitt, thrusters", "rcs-schmitt"),
+    Case("contraction-noise, a noisy gyro", "contraction-noise", ("duration=10",)),
+)
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     warnings.simplefilter("ignore")
-    print(f"{'':52}{'ratio':>8}{'us a step':>12}")
-    steps = 30_000
-    for control in ("1 ms", "10 ms"):
-        vehicle = built(f"duration={steps * 1e-3}", f"rates.control='{control}'")
-        bare = bare_steps(vehicle, steps)
-        report(f"one vehicle, control {control}, not logged", flight(vehicle), bare, steps)
-        report(f"one vehicle, control {control}, all logged", logged(vehicle), bare, steps)
-    vehicle, steps = built("duration=0.5"), 500
-    for threads in (1, 2):
-        bare = bare_batch(vehicle, 256, threads, steps)
-        flown = flight(vehicle, 256, threads)
-        report(f"256 vehicles, control 1 ms, {threads} threads", flown, bare, 256 * steps)
+    words = sys.argv[1:]
+
+    def wanted(name: str) -> bool:
+        return not words or any(word in name for word in words)
+
+    head("one vehicle", "logged", "us a step", "bare", "ratio", "aim")
+    for case in CASES:
+        if wanted(case.name):
+            vehicle = built(case.scenario, *case.changes)
+            steps = steps_of(vehicle)
+            run = logged(vehicle) if case.logged else flight(vehicle)
+            report((case.name, "yes" if case.logged else "no"), run, vehicle, steps, case.aim)
+    if wanted("mjspace run"):
+        command_line("contraction-adaptive", 60)
+    if wanted("own law"):
+        print()
+        own_law()
+    if wanted("256 vehicles"):
+        print()
+        many()
 
 
-def report(name: str, run: Callable[[], object], bare: Callable[[], object], steps: int) -> None:
-    """Print how much longer ``run`` takes than ``bare``, and its time for each of its steps."""
-    run(), bare()
-    pairs = [(seconds(run), seconds(bare)) for _ in range(ROUNDS)]
-    ratio = median(a / b for a, b in pairs)
-    print(f"{name:52}{ratio:8.2f}{min(a for a, _ in pairs) / steps * 1e6:12.2f}")
+def report(names: tuple[str, str], run: Run, vehicle: Assembly, steps: int, aim: str) -> None:
+    """Print how much longer ``run`` takes than bare steps, and both for a step."""
+    times = paired(run, bare_steps(vehicle, steps))
+    each = 1e6 * times.min(axis=0) / steps
+    row(*names, f"{each[0]:.1f}", f"{each[1]:.1f}", f"{ratio(times):.2f}", aim)
 
 
-def built(*overrides: str) -> Assembly:
-    """Return contraction-adaptive, without checks."""
-    return assemble(*load("contraction-adaptive", ["checks=[]", *overrides]))
+def command_line(scenario: str, duration: int) -> None:
+    """Print the same for ``mjspace run`` as a process: start, flight, log and checks."""
+    vehicle = built(scenario, f"duration={duration}")
+    command = [sys.executable, "-m", "mjspace", "run", scenario, "--duration", str(duration)]
+    name = f"`mjspace run`, {duration} s of the first, start included"
+    with tempfile.TemporaryDirectory() as folder:
+        run = partial(subprocess.run, [*command, "--out", folder], capture_output=True)
+        report((name, "yes"), run, vehicle, steps_of(vehicle), "")
 
 
-def flight(vehicle: Assembly, count: int = 1, threads: int = 1) -> Callable[[], object]:
-    """Return a flight of ``count`` vehicles without a log."""
-    members = range(count)
-    return lambda: sum(
-        len(b.time) for b in fly(vehicle, first_start(vehicle, members), members, threads=threads)
+def own_law() -> None:
+    """Print what a law of one's own costs, and what is left of it without the law's own time."""
+    head("a law of one's own, 1 kHz, logged", "us a step", "law", "bare", "ratio", "rest", "aim")
+    cases = (("20 lines of NumPy", own.Feedback), ("with a branch", own.Branching))
+    for name, law in cases:
+        vehicle = built(OWN_LAW, "duration=20", f"law.kind=own_law.py:{law.__name__}")
+        steps = steps_of(vehicle)
+        times = paired(logged(vehicle), calls(law(), steps), bare_steps(vehicle, steps))
+        rest = median((times[:, 0] - times[:, 1]) / times[:, 2])
+        each = 1e6 * times.min(axis=0) / steps
+        figures = (*(f"{us:.1f}" for us in each), f"{ratio(times):.2f}", f"{rest:.2f}")
+        row(name, *figures, "1.6" if law is own.Branching else "")
+
+
+def calls(law: Law, count: int) -> Run:
+    """Return a loop in Python of the law's ``step``, of a vehicle that turns."""
+    measurement = Measurement(
+        attitude=np.array([0.6, 0.48, -0.48, 0.424]), rate=np.array([0.05, -0.03, 0.04])
     )
-
-
-def logged(vehicle: Assembly) -> Callable[[], object]:
-    """Return a flight of one vehicle with everything logged."""
+    reference = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
 
     def run() -> None:
-        with tempfile.TemporaryDirectory() as folder:
-            fly_to_log(vehicle, Path(folder) / "flight.mcap")
+        for _ in range(count):
+            law.step(None, 0.0, measurement, reference)
 
     return run
 
 
-def bare_steps(vehicle: Assembly, steps: int) -> Callable[[], object]:
-    """Return a loop of ``mj_step`` in Python."""
-    model = vehicle.vehicle.model
-    data = mujoco.MjData(model)
-    data.qpos, data.qvel, data.userdata = vehicle.qpos, vehicle.qvel, vehicle.userdata
-
-    def run() -> None:
-        for _ in range(steps):
-            mujoco.mj_step(model, data)
-
-    return run
-
-
-def bare_batch(vehicle: Assembly, count: int, threads: int, steps: int) -> Callable[[], object]:
-    """Return a loop of ``Batch.step`` in Python."""
-    batch = Batch(vehicle.vehicle.model, count, threads)
-    batch.qpos, batch.qvel = np.tile(vehicle.qpos, (count, 1)), np.tile(vehicle.qvel, (count, 1))
-    batch.userdata = np.tile(vehicle.userdata, (count, 1))
-
-    def run() -> None:
-        for _ in range(steps):
-            batch.step()
-
-    return run
-
-
-def seconds(run: Callable[[], object]) -> float:
-    """Return how long ``run`` takes."""
-    start = time.perf_counter()
-    run()
-    return time.perf_counter() - start
+def many() -> None:
+    """Print what a batch costs."""
+    head("256 vehicles, 1 kHz, not logged", "us a step", "bare", "ratio", "aim")
+    vehicle = built("contraction-adaptive", "duration=0.5")
+    steps = steps_of(vehicle)
+    for threads, aim in ((1, "1.08"), (2, "1.08")):
+        times = paired(flight(vehicle, 256, threads), bare_batch(vehicle, 256, threads, steps))
+        each = 1e6 * times.min(axis=0) / (256 * steps)
+        row(f"{threads} threads", *(f"{us:.1f}" for us in each), f"{ratio(times):.2f}", aim)
 
 
 if __name__ == "__main__":
