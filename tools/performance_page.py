@@ -29,7 +29,9 @@ def main() -> None:
         command = [sys.executable, f"benchmarks/{script}", *arguments]
         done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
         command_line = f"python benchmarks/{block[2]}"
-        return f"{block[1]}\n`{command_line}`, {measured_on()}\n\n{done.stdout.strip()}\n\n{block[3]}"
+        return (
+            f"{block[1]}\n`{command_line}`, {measured_on()}\n\n{done.stdout.strip()}\n\n{block[3]}"
+        )
 
     PAGE.write_text(BLOCK.sub(table, PAGE.read_text()))
 
