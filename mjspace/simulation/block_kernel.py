@@ -42,7 +42,7 @@ ORDERS = np.dtype([
     ("after_sensing", *_TABLE), ("after_driving", *_TABLE),
     # into MuJoCo's arrays: (word of mjData that points there, offset, from, size)
     ("applied", *_TABLE),
-    # recorded before and after the first integration step: (from, in the record, size)
+    # recorded before and after the first integration step: (in the record, from, size)
     ("before", *_TABLE), ("after", *_TABLE),
     ("record", _NUMBER), ("period_stride", _NUMBER), ("vehicle_stride", _NUMBER),
     # in the memory: the time [s], the state row, the motors that saturate
@@ -54,9 +54,9 @@ ORDERS = np.dtype([
 """What is flown; places in a memory are offsets [bytes], sizes are in bytes."""
 _ORDERS = from_dtype(ORDERS)
 _POINTER, _INT = ir.IntType(8).as_pointer(), ir.IntType(32)
-
-
-_intrinsic: Any = intrinsic
+_MOST_WORDS = 1 << 20
+"""More than mjData has: only words that ``applied`` and ``sensors_word`` name are read."""
+_intrinsic: Any = intrinsic  # whose own type leaves out that numba passes the context
 
 
 def _call(builder: Any, address: Any, pointers: Any, *others: Any) -> Any:
@@ -194,7 +194,3 @@ def _compiled(version: int) -> Any:
             _fly(orders, memory, words, _address(model), _address(data), fields, vehicle)
 
     return fly
-
-
-_MOST_WORDS = 1 << 20
-"""More than mjData has: only words that ``applied`` and ``sensors_word`` name are read."""

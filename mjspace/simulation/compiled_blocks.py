@@ -1,6 +1,5 @@
 """Compiled blocks of a flight, each proved by its first period, which Python flies as well."""
 
-import time as clock
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -13,7 +12,6 @@ from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compile_period import compile_period
 from mjspace.simulation.compiled_flight import CompiledFlight
-from mjspace.simulation.compiled_period import CompiledPeriod
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import Start
@@ -29,7 +27,6 @@ class CompiledBlocks:
     Attributes:
         on: whether the next block's inside is compiled.
         reason: why it is not, or why sensors and law are not; "" where all is.
-        seconds: wall time of a period of the last block [s]; 0 before the first.
     """
 
     def __init__(
@@ -44,9 +41,7 @@ class CompiledBlocks:
         self._assembly, self._start = assembly, start
         self._members, self._threads = members, threads
         self._stepper, self._law = stepper, law
-        self._period: CompiledPeriod
         self._flight: CompiledFlight | None = None
-        self.seconds = 0.0
         effects = " and ".join(effect.name for effect in stepper.effects)
         self.reason = f"{effects} can act between compiled steps in Python alone" if effects else ""
         self.on = not effects
@@ -74,14 +69,13 @@ class CompiledBlocks:
         be had, or differs from them or in the state that they lead to, they are returned, and
         Python flies on. ``stop`` is called in each period in which the law is called in Python.
         """
-        began = clock.monotonic()
         after, trouble = self._after_a_period(), None
         try:
             flight = self._flight or self._compile(first, desired)
             flight.set(first.physics, first.memory, first.sensors, first.law)
-            flight.begin(first.number, count, last, desired)
-            if self._period.has_law:
-                flight.fly(count)
+            flight.begin(first.number, count, last)
+            if flight.has_law:
+                flight.fly(desired)
                 compiled = flight.columns()
             else:
                 compiled, trouble = self._fly_law_in_python(flight, first, count, desired, stop)
@@ -102,13 +96,10 @@ class CompiledBlocks:
             self._off(f"{different} differs from Python's", after)
             return columns, None
         self._take(flight)
-        if self._period.has_law:
-            stepper = self._stepper
-            stepper.sensors = {name: values.copy() for name, values in flight.sensors.items()}
+        if flight.has_law:
+            self._stepper.sensors = _copied(flight.sensors)
             kind: Any = type(flight.law)
-            kept = [values.copy() for values in flight.law]
-            self._law.state = kind(*kept) if kept else ()
-        self.seconds = (clock.monotonic() - began) / len(compiled)
+            self._law.state = kind(*(values.copy() for values in flight.law)) if flight.law else ()
         return compiled, trouble
 
     def _fly_law_in_python(
@@ -125,7 +116,7 @@ class CompiledBlocks:
         """
         trouble: FlightError | None = None
         recording = Recording(first, count, OF_THE_LAW)
-        flight.fly(1, first.command)
+        flight.fly_period(first.command)
         recording.write(first)
         rows: Any = zip(*(array[1:count] for array in desired), strict=True)
         for number, row in enumerate(rows, first.number + 1):
@@ -139,7 +130,7 @@ class CompiledBlocks:
             except FlightError as error:
                 trouble = stopped_at(period.time, error)
                 break
-            flight.fly(1, period.command)
+            flight.fly_period(period.command)
             recording.write(period)
             if stop():
                 break
@@ -149,7 +140,7 @@ class CompiledBlocks:
     def _take(self, flight: CompiledFlight) -> None:
         """Put the stepper where the compiled flight is."""
         self._stepper.batch.state[...] = flight.physics
-        self._stepper.memory = {name: values.copy() for name, values in flight.memory.items()}
+        self._stepper.memory = _copied(flight.memory)
 
     def _compile(self, example: ControlPeriod, desired: DesiredMotion) -> CompiledFlight:
         """Return the compiled flight, of the law too if that can be.
@@ -160,14 +151,14 @@ class CompiledBlocks:
         arguments = self._assembly, self._stepper.layout, example
         reference = type(desired)(*(each[0] for each in desired))
         try:
-            self._period = compile_period(*arguments, reference, law=True)
+            period = compile_period(*arguments, reference, law=True)
         except Untraceable as error:
             self.reason = str(error)
-            self._period = compile_period(*arguments, reference, law=False)
+            period = compile_period(*arguments, reference, law=False)
         self._flight = CompiledFlight(
             self._assembly,
             self._stepper.layout,
-            self._period,
+            period,
             self._start,
             self._members,
             self._threads,
@@ -191,6 +182,10 @@ def stopped_at(time: float, error: Exception) -> FlightError:
     trouble = FlightError(f"stopped at t = {time:.6g} s: {error}")
     trouble.__cause__ = error.__cause__ or error
     return trouble
+
+
+def _copied(state: State) -> State:
+    return {name: values.copy() for name, values in state.items()}
 
 
 class _After(NamedTuple):

@@ -78,52 +78,64 @@ class CompiledFlight:
         for target, values in zip(self.law, law, strict=True):
             target[...] = values
 
-    def begin(self, first: int, count: int, last: int, desired: DesiredMotion) -> None:
+    def begin(self, first: int, count: int, last: int) -> None:
         """Begin a block of ``count`` periods from number ``first`` on.
 
-        The flight's ``last`` is not flown. ``desired`` has a row for each period.
+        The flight's ``last`` is not flown.
         """
         self._first, self._flown = first, 0
         self._recorded = np.empty((count, len(self.physics), self._record_size), np.uint8)
         orders = self._orders
         orders["last"] = last
         orders["period_stride"], orders["vehicle_stride"] = self._recorded.strides[:2]
-        self._desired = [np.ascontiguousarray(rows[:count]) for rows in desired]
 
-    def fly(self, count: int, command: Any = None) -> None:
-        """Fly the next ``count`` periods of the block; one, where the ``command`` is the law's.
+    def fly(self, desired: DesiredMotion) -> None:
+        """Fly the whole block with its law; ``desired`` has at least a row for each period.
 
         A warning of MuJoCo's is left to be found in ``warned``.
 
         Raises:
             mujoco.batch.SimulationError: MuJoCo raised an error.
         """
-        orders = self._orders
-        if self._period.has_law:
-            first = self._first + self._flown
-            draws = self._suite.draws(range(first, first + count))
-            desired = [rows[self._flown :, None] for rows in self._desired]
-            arrays = [*desired, *draws.values()]
-            inputs = _table(
-                (
-                    self._offset(to),
-                    of.ctypes.data,
-                    of.strides[0],
-                    of.shape[1] > 1 and of.strides[1],
-                    to.nbytes,
-                )
-                for to, of in zip(
-                    (*self._period.reference, *self._period.draws.values()), arrays, strict=True
-                )
+        period, count = self._period, len(self._recorded)
+        # The same for every vehicle, and of each its own.
+        rows = [np.ascontiguousarray(array[:count])[:, None] for array in desired]
+        rows += self._suite.draws(range(self._first, self._first + count)).values()
+        targets = (*period.reference, *period.draws.values())
+        inputs = _table(
+            (
+                self._offset(to),
+                of.ctypes.data,
+                of.strides[0],
+                of.strides[1] if of.shape[1] > 1 else 0,
+                to.nbytes,
             )
-            orders["inputs"] = inputs.ctypes.data, len(inputs)
-        else:
-            for target, values in zip(self.command, command, strict=True):
-                target[...] = values
+            for to, of in zip(targets, rows, strict=True)
+        )
+        self._orders["inputs"] = inputs.ctypes.data, len(inputs)
+        self._fly(count)
+
+    def fly_period(self, command: Any) -> None:
+        """Fly the next period of the block under the law's ``command``.
+
+        Raises:
+            mujoco.batch.SimulationError: as ``fly``.
+        """
+        for target, values in zip(self.command, command, strict=True):
+            target[...] = values
+        self._fly(1)
+
+    def _fly(self, count: int) -> None:
+        orders, recorded = self._orders, self._recorded
         orders["first"], orders["count"] = self._first + self._flown, count
-        orders["record"] = self._recorded.ctypes.data + self._flown * self._recorded.strides[0]
+        orders["record"] = recorded.ctypes.data + self._flown * recorded.strides[0]
         self._batch.apply(self._function, orders.ctypes.data)
         self._flown += count
+
+    @property
+    def has_law(self) -> bool:
+        """Whether the law is compiled; else each period is flown under its command."""
+        return self._period.has_law
 
     @property
     def warned(self) -> bool:

@@ -17,8 +17,7 @@ from mjspace.simulation.events import with_declared_events
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import Start, first_start, last_period
 from mjspace.simulation.recording import (
-    OF_THE_LAW,
-    OF_THE_VEHICLE,
+    EVERYTHING,
     Block,
     Columns,
     Recording,
@@ -30,7 +29,6 @@ from mjspace.simulation.user_code import reference_at
 
 BLOCK_PERIODS = 2000
 BLOCK_BYTES = 32_000_000  # of many vehicles, about
-_EVERYTHING = (*OF_THE_LAW, *OF_THE_VEHICLE)
 BLOCK_SECONDS = 0.25  # of wall time: a kill may cost three blocks, and should not cost a second
 
 
@@ -61,8 +59,6 @@ def fly(
     layout, effects = flight.stepper.layout, flight.stepper.effects
     while period <= last:
         columns, desired, trouble = flight.record(period, last, stop)
-        if columns is None:
-            raise trouble or AssertionError
         block = block_of(period, desired, columns, assembly, layout, effects, saturated)
         block, problem = until_trouble(block, layout)
         if len(block.time):
@@ -105,28 +101,32 @@ class _Flight:
         # Each period, with law, signals and measurement.
         recorded = 4 * self.stepper.batch.state.nbytes
         self._periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
+        self._seconds = 0.0  # of wall time, of a period of the last block
 
     def record(
         self, first: int, last: int, stop: Callable[[], bool]
-    ) -> tuple[Columns | None, DesiredMotion, FlightError | None]:
+    ) -> tuple[Columns, DesiredMotion, FlightError | None]:
         """Fly a block of periods; return what it recorded, what was desired, and what ended it.
 
         Where the period can be compiled, its first is flown in Python, and proves the rest.
+
+        Raises:
+            FlightError: nothing was recorded.
         """
-        count = min(self._periods, last - first + 1)
+        began = clock.monotonic()
+        count = _in_a_block(min(self._periods, last - first + 1), self._seconds)
         times = np.arange(first, first + count, dtype=float) * self._control
         desired = reference_at(self._assembly.reference, times)
         if not self.compiled.on:
             columns, _, trouble = self._fly_in_python(first, count, last, desired, stop)
-            return columns, desired, trouble
-        began = clock.monotonic()
-        columns, period, trouble = self._fly_in_python(first, 1, last, desired, stop)
-        seconds = self.compiled.seconds or clock.monotonic() - began  # of a period
-        count = min(count, max(2, int(min(count, BLOCK_SECONDS / seconds))))
-        if count > 1 and columns is not None and trouble is None:
-            due = clock.monotonic() + BLOCK_SECONDS
-            ends = lambda: stop() or clock.monotonic() > due  # noqa: E731 - both are conditions
-            columns, trouble = self.compiled.fly(period, columns, count, last, desired, ends)
+        else:
+            columns, period, trouble = self._fly_in_python(first, 1, last, desired, stop)
+            count = _in_a_block(count, self._seconds or clock.monotonic() - began)
+            if count > 1 and trouble is None:
+                due = clock.monotonic() + BLOCK_SECONDS
+                ends = lambda: stop() or clock.monotonic() > due  # noqa: E731 - both are conditions
+                columns, trouble = self.compiled.fly(period, columns, count, last, desired, ends)
+        self._seconds = (clock.monotonic() - began) / len(columns)
         return columns, desired, trouble
 
     def _fly_in_python(
@@ -136,11 +136,15 @@ class _Flight:
         last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> tuple[Columns | None, Any, FlightError | None]:
-        """Return what ``count`` periods recorded, the last of them, and what ended them."""
+    ) -> tuple[Columns, ControlPeriod, FlightError | None]:
+        """Return what ``count`` periods recorded, the last of them, and what ended them.
+
+        Raises:
+            FlightError: nothing was recorded.
+        """
         recording: Recording | None = None
         due = clock.monotonic() + BLOCK_SECONDS
-        now, period, trouble = first * self._control, None, None
+        now, trouble = first * self._control, None
         try:
             # A law's infinities are found in what it commands, not in NumPy's warnings.
             with np.errstate(all="ignore"):
@@ -148,7 +152,7 @@ class _Flight:
                 for number, row in enumerate(rows, first):
                     now = number * self._control
                     period = self._begin_period(number, type(desired)(*row), number < last)
-                    recording = recording or Recording(period, count, _EVERYTHING)
+                    recording = recording or Recording(period, count, EVERYTHING)
                     try:
                         if number < last:
                             self.stepper.finish(period)
@@ -158,13 +162,16 @@ class _Flight:
                         break
         except (SimulationError, FlightError) as error:
             trouble = stopped_at(now, error)
+            if recording is None:
+                raise trouble from trouble.__cause__
         raised = np.flatnonzero(self.stepper.batch.warning[:, :, 1].any(axis=0))
         if trouble is None and len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name
             trouble = FlightError(
                 f"MuJoCo warned ({warning}) between t = {first * self._control:.6g} s and now"
             )
-        return None if recording is None else recording.columns(), period, trouble
+        assert recording is not None
+        return recording.columns(), period, trouble
 
     def _begin_period(self, number: int, reference: DesiredMotion, flown: bool) -> ControlPeriod:
         period = self.stepper.sense(number)
@@ -173,3 +180,13 @@ class _Flight:
         )
         self.stepper.begin(period, flown=flown)
         return period
+
+
+def _in_a_block(count: int, seconds: float) -> int:
+    """Return how many of ``count`` periods a block has, if one takes so many ``seconds``.
+
+    All, if that is not known yet and 0; else at least two, of which the first proves the second.
+    """
+    if not seconds:
+        return count
+    return min(count, max(2, int(min(count, BLOCK_SECONDS / seconds))))

@@ -71,7 +71,10 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
 
 OF_THE_LAW = ("sensors", "measurement", "law", "signals")
 """What sensors and law leave in a ``ControlPeriod``."""
-OF_THE_VEHICLE = ("physics", "memory", "command", "applied", "saturated", "wrench", "sensordata")
+EVERYTHING = (
+    *OF_THE_LAW,
+    *("physics", "memory", "command", "applied", "saturated", "wrench", "sensordata"),
+)
 _AS_FLOATS = ("law", "command", "signals")
 
 

@@ -13,7 +13,7 @@ from mjspace.tracing.program import Calls
 
 _BYTE, _WORD = ir.IntType(8), ir.IntType(64)
 _POINTER = _BYTE.as_pointer()
-_intrinsic: Any = intrinsic
+_intrinsic: Any = intrinsic  # whose own type leaves out that numba passes the context
 
 
 @_intrinsic

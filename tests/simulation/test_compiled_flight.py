@@ -336,10 +336,10 @@ def test_an_error_of_mujoco_in_a_block_is_met_in_python(monkeypatch: pytest.Monk
     python, calls = flown(built, compiled=False), 0
     flies = CompiledFlight.fly
 
-    def failing(self: Any, count: int, command: Any = None) -> None:
+    def failing(self: Any, desired: Any) -> None:
         nonlocal calls
         calls += 1
-        flies(self, count, command)
+        flies(self, desired)
         if calls == 2:
             raise SimulationError(np.array([0]), "no room", 1)
 
