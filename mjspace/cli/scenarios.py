@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from mjspace.errors import InputError
 from mjspace.terminal.options import Json, Set
 from mjspace.terminal.reporting import open_log
 
@@ -36,6 +37,8 @@ def info(
     as_json: Json = False,
 ) -> None:
     """Show a scenario in full, or what a log holds."""
+    if compiled and (as_json or target.endswith(".mcap")):
+        raise InputError("--compiled: answers in one line about a scenario, without --json")
     if target.endswith(".mcap"):
         from mjspace.runner import report
 

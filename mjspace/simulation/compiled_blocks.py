@@ -154,7 +154,10 @@ class CompiledBlocks:
             period = compile_period(*arguments, reference, law=True)
         except Untraceable as error:
             self.reason = str(error)
-            period = compile_period(*arguments, reference, law=False)
+            try:
+                period = compile_period(*arguments, reference, law=False)
+            except Untraceable as another:
+                raise Untraceable(f"{error}, and {another}") from another
         self._flight = CompiledFlight(
             self._assembly,
             self._stepper.layout,

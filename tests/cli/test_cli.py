@@ -44,6 +44,30 @@ def test_help_and_list() -> None:
         assert description
 
 
+@pytest.mark.parametrize(
+    ("scenario", "line"),
+    [
+        ("contraction-ideal", "compiled: sensors, law and actuators"),
+        (
+            "dgvscmg-slow-loops",
+            "flown in Python: a Python number, or text, made of a measured value (dgvscmg.py:191), "
+            "and the law has an inner loop",
+        ),
+    ],
+)
+def test_info_says_what_is_compiled(scenario: str, line: str) -> None:
+    assert mjspace("info", scenario, *SHORT, "--compiled").stdout == f"{line}\n"
+
+
+@pytest.mark.parametrize("words", [("flight.mcap",), ("contraction-ideal", "--json")])
+def test_what_is_compiled_is_of_a_scenario_and_one_line(words: tuple[str, ...]) -> None:
+    done = mjspace("info", *words, "--compiled")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        "mjspace: --compiled: answers in one line about a scenario, without --json\n"
+    )
+
+
 def test_a_run_that_keeps_its_checks_ends_with_0(
     flown: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:

@@ -110,6 +110,12 @@ SCENARIOS = {
         "events=[{name='slow',signal='truth.rate[0]',below=0.29}]",
     ],
     "contraction-ideal": ["duration=0.5", "rates.control='10 ms'"],
+    "contraction-noise": [
+        "duration=0.1",
+        *("sensors.attitude.noise_std=1e-3", "sensors.attitude.delay='3 ms'"),
+        *("sensors.rate.bias_std=0.01", "sensors.rate.bias_walk=0.01"),
+    ],
+    "dgvscmg-sensorless": ["duration=0.05"],  # an inner loop that measures with a bias
 }
 
 
@@ -124,7 +130,57 @@ def test_compiled_rows_and_events_are_pythons(name: str) -> None:
         assert any("saturated" in event.message for event in compiled.events)
 
 
-@pytest.mark.parametrize("name", ["contraction-adaptive", "dgvscmg-tracking"])
+def test_a_motor_that_saturates_before_the_last_step_of_a_period_counts() -> None:
+    # At 20 V the outer gimbal's motor saturates for 37 periods on end, in the last step of 32.
+    limited = "plant.drives.cmg_outer.voltage_limit=20"
+    built = assembly("dgvscmg-tracking", "duration=0.05", limited)
+    compiled, python = flown(built), flown(built, compiled=False)
+    assert compiled.compiled == WHOLE
+    assert_same(compiled, python)
+    assert [event.message for event in compiled.events] == ["cmg_outer saturated"]
+
+
+INNER = """
+from dataclasses import dataclass
+
+import numpy as np
+
+from mjspace.controllers.cmg.dgvscmg import Cascade
+
+
+@dataclass(frozen=True)
+class Law(Cascade):
+    def inner(self, state, time, command, measurement):
+        after, motors = super().inner(state, time, command, measurement)
+        return after, motors._replace(voltage=motors.voltage + 0.1 * np.sin(3000.0 * time))
+"""
+
+
+def test_an_inner_loop_has_the_time_of_each_integration_step(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(INNER)
+    built = assembly(
+        "dgvscmg-tracking", "duration=0.05", "law={kind='own.py:Law'}", folder=tmp_path
+    )
+    compiled = flown(built)
+    assert compiled.compiled == WHOLE
+    assert_same(compiled, flown(built, compiled=False))
+
+
+@pytest.mark.parametrize(
+    ("timing", "reason"),
+    [
+        (["sensors.rate.period='5 ms'"], "other times than the control instants"),
+        (["rates.physics='0.5 ms'", "sensors.rate.period='0.5 ms'"], "between control instants"),
+    ],
+)
+def test_sensors_with_times_of_their_own_sample_then(timing: list[str], reason: str) -> None:
+    built = assembly("contraction-noise", "duration=0.1", *timing)
+    mixed, python = flown(built), flown(built, compiled=False)
+    assert reason in mixed.compiled
+    assert_same(mixed, python)
+
+
+@pytest.mark.parametrize("name", ["contraction-adaptive", "dgvscmg-tracking", "contraction-noise"])
 def test_vehicles_are_alike_alone_and_together_at_any_number_of_threads(name: str) -> None:
     built = assembly(name, *SCENARIOS[name], "duration=0.05")
     members = (0, 1, 2, 3)
