@@ -1,6 +1,7 @@
 """A flight whose periods are compiled is the flight in Python, bit by bit, event by event."""
 
 import dataclasses
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -131,8 +132,8 @@ def test_compiled_rows_and_events_are_pythons(name: str) -> None:
 
 
 def test_a_motor_that_saturates_before_the_last_step_of_a_period_counts() -> None:
-    # At 20 V the outer gimbal's motor saturates for 37 periods on end, in the last step of 32.
-    limited = "plant.drives.cmg_outer.voltage_limit=20"
+    # At 40 V the outer gimbal's motor saturates in the first steps of the first period alone.
+    limited = "plant.drives.cmg_outer.voltage_limit=40"
     built = assembly("dgvscmg-tracking", "duration=0.05", limited)
     compiled, python = flown(built), flown(built, compiled=False)
     assert compiled.compiled == WHOLE
@@ -150,19 +151,34 @@ from mjspace.controllers.cmg.dgvscmg import Cascade
 
 @dataclass(frozen=True)
 class Law(Cascade):
+    def step(self, state, time, measurement, reference):
+        TROUBLE
+        return super().step(state, time, measurement, reference)
+
     def inner(self, state, time, command, measurement):
         after, motors = super().inner(state, time, command, measurement)
         return after, motors._replace(voltage=motors.voltage + 0.1 * np.sin(3000.0 * time))
 """
 
 
-def test_an_inner_loop_has_the_time_of_each_integration_step(tmp_path: Path) -> None:
-    (tmp_path / "own.py").write_text(INNER)
+@pytest.mark.parametrize(
+    ("trouble", "what"),
+    [
+        ("pass", WHOLE),
+        ("assert time >= 0.0", r"flown in Python: a branch .* and the law has an inner loop"),
+    ],
+)
+def test_an_inner_loop_has_the_time_of_each_step_and_the_sensors_last_report(
+    trouble: str, what: str, tmp_path: Path
+) -> None:
+    (tmp_path / "own.py").write_text(INNER.replace("TROUBLE", trouble))
     built = assembly(
-        "dgvscmg-tracking", "duration=0.05", "law={kind='own.py:Law'}", folder=tmp_path
+        "dgvscmg-tracking",
+        *("duration=0.05", "law={kind='own.py:Law'}", "sensors.wheel_speed.noise_std=0.001"),
+        folder=tmp_path,
     )
     compiled = flown(built)
-    assert compiled.compiled == WHOLE
+    assert re.fullmatch(what, compiled.compiled)
     assert_same(compiled, flown(built, compiled=False))
 
 
@@ -403,6 +419,59 @@ def test_an_error_of_mujoco_in_a_block_is_met_in_python(monkeypatch: pytest.Monk
     found = flown(built)
     assert "no room" in found.compiled
     assert_same(found, python)
+
+
+def test_an_error_of_mujoco_where_the_law_is_called_is_met_in_python(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The law and the sensors have gone on by then: both go back to the block's second period.
+    branch = "torque = torque if size > 0.1 else 2.0 * torque"
+    noisy = "sensors.rate.noise_std=0.01"
+    built = own_law(tmp_path, branch, 0.1, noisy)
+    python, calls = flown(built, compiled=False), 0
+    flies = CompiledFlight.fly_period
+
+    def failing(self: Any, command: Any) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == 60:
+            raise SimulationError(np.array([0]), "no room", 1)
+        flies(self, command)
+
+    monkeypatch.setattr(CompiledFlight, "fly_period", failing)
+    found = flown(built)
+    assert (calls, "no room" in found.compiled) == (60, True)
+    assert_same(found, python)
+
+
+BATCHED = """
+import numpy as np
+from mjspace.contract import TorqueCommand
+
+
+class Law:
+    batched = True
+
+    def reset(self, measurement, reference):
+        return None
+
+    def step(self, state, time, measurement, reference):
+        torque = -1.0 * measurement.rate
+        return None, TorqueCommand(torque if time < 0.0605 else torque.astype(str) + "?"), None
+"""
+
+
+def test_a_command_that_is_no_numbers_any_more_ends_the_flight_as_in_python(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "own.py").write_text(BATCHED)
+    built = assembly(
+        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
+    )
+    compiled, python = flown(built), flown(built, compiled=False)
+    assert "actuators compiled" in compiled.compiled
+    assert "the law's command: torque is not numbers" in python.trouble
+    assert_same(compiled, python)
 
 
 def test_stop_ends_it_after_the_block() -> None:

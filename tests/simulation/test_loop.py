@@ -278,6 +278,34 @@ def test_a_disturbance_of_ones_own_acts_and_is_logged(tmp_path: Path) -> None:
     )
 
 
+def test_a_period_that_breaks_off_is_logged(tmp_path: Path) -> None:
+    (tmp_path / "push.py").write_text(
+        "import numpy as np\n"
+        "def push(time, truth):\n"
+        "    assert time < 0.0235, 'too late'\n"
+        "    return np.zeros(3), np.zeros(3)\n"
+    )
+    built = assembly(
+        "contraction-ideal",
+        *("duration=0.1", "rates.control='10 ms'", "environment.python='push.py:push'"),
+        folder=tmp_path,
+    )
+    blocks = fly(built, first_start(built, (0,)))
+    np.testing.assert_allclose(next(blocks).time, [0.0, 0.01, 0.02])
+    with pytest.raises(FlightError, match=r"stopped at t = 0\.02 s: the disturbance raised"):
+        next(blocks)
+
+
+@pytest.mark.parametrize(
+    ("count", "seconds", "fit"),
+    [(2000, 0.0, 2000), (2000, 1e-3, 250), (200, 1e-3, 200), (2000, 9.0, 2), (1, 9.0, 1)],
+)
+def test_a_block_has_as_many_periods_as_its_time_allows(
+    count: int, seconds: float, fit: int
+) -> None:
+    assert loop._in_a_block(count, seconds) == fit
+
+
 CASES = {
     "contraction-ideal": 1e-8,
     "contraction-adaptive": 1e-8,
