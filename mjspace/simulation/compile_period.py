@@ -13,9 +13,9 @@ import numpy as np
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
 from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.compiled_period import CompiledPeriod, Copies, Recorded
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.hidden_memory import refusing_hidden_memory
+from mjspace.simulation.period_program import Copies, PeriodProgram, Recorded
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
@@ -32,7 +32,7 @@ def compile_period(
     reference: DesiredMotion,
     *,
     law: bool,
-) -> CompiledPeriod:
+) -> PeriodProgram:
     """Return the program of a period like the ``example``, at which ``reference`` is desired.
 
     Without ``law`` it begins with the law's command.
@@ -83,7 +83,7 @@ class _Tracing:
         law = assembly.law
         self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
 
-    def with_law(self) -> CompiledPeriod:
+    def with_law(self) -> PeriodProgram:
         """Return the program of sensors, law and actuators.
 
         Raises:
@@ -118,7 +118,7 @@ class _Tracing:
             kinds={"law": type(self.law_state), "signals": type(signals)},
         )
 
-    def of_command(self, command: Any) -> CompiledPeriod:
+    def of_command(self, command: Any) -> PeriodProgram:
         """Return the program of the actuators under the law's ``command``.
 
         Raises:
@@ -147,7 +147,7 @@ class _Tracing:
         after_sensing: Copies,
         recorded: list[Recorded],
         kinds: dict[str, type],
-    ) -> CompiledPeriod:
+    ) -> PeriodProgram:
         """Return the program that goes on with the actuators; ``recorded`` is of the law."""
         own = tuple(self.memory.values())
         with self.program.section() as driving:
@@ -168,7 +168,7 @@ class _Tracing:
         before += [*recorded, *_recorded("command", command)]
         after = [Recorded("sensordata", "", self.sensordata)]
         after += [Recorded("applied", str(index), array) for index, array in enumerate(outputs)]
-        return CompiledPeriod(
+        return PeriodProgram(
             program=self.program,
             sensing=sensing,
             driving=driving[0],

@@ -9,9 +9,9 @@ from mjspace.contract import Array, DesiredMotion
 from mjspace.environment import struct_offsets
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.block_kernel import ORDERS, block_function
-from mjspace.simulation.compiled_period import CompiledPeriod, Copies, Recorded
 from mjspace.simulation.initial_state import INTEGRATION, Start
 from mjspace.simulation.native_batch import NativeBatch, address
+from mjspace.simulation.period_program import Copies, PeriodProgram, Recorded
 from mjspace.simulation.recording import Columns
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
@@ -34,7 +34,7 @@ class CompiledFlight:
         self,
         assembly: Assembly,
         layout: StateLayout,
-        period: CompiledPeriod,
+        period: PeriodProgram,
         start: Start,
         members: Sequence[int],
         threads: int,

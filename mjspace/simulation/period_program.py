@@ -20,7 +20,7 @@ class Recorded(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CompiledPeriod:
+class PeriodProgram:
     """The program of one vehicle's control period; all arrays are views of its memory."""
 
     program: Program
