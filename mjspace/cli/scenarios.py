@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from mjspace.errors import InputError
 from mjspace.terminal.options import Json, Set
 from mjspace.terminal.reporting import open_log
 
@@ -37,6 +38,8 @@ def info(
 ) -> None:
     """Show a scenario in full, or what a log holds."""
     if target.endswith(".mcap"):
+        if compiled:
+            raise InputError(f"--compiled: {target} is a log: name its scenario instead")
         from mjspace.runner import report
 
         log = open_log(Path(target))
@@ -52,6 +55,7 @@ def info(
         from mjspace.simulation.assembly import assemble
         from mjspace.simulation.loop import what_is_compiled
 
-        print(what_is_compiled(assemble(scenario, folder)))
+        found = what_is_compiled(assemble(scenario, folder))
+        print(json.dumps(found) if as_json else found)
         return
     print(scenario.model_dump_json(indent=2) if as_json else to_toml(scenario).rstrip())

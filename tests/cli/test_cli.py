@@ -101,6 +101,7 @@ def test_json_is_all_there_is(tmp_path: Path) -> None:
             ["environment.python"],
         ),
         (["info", "nothing.mcap"], ["nothing.mcap"]),
+        (["info", "nothing.mcap", "--compiled"], ["--compiled: nothing.mcap is a log"]),
         (["replay", "nothing.mcap"], ["nothing.mcap"]),
         (["plot", "nothing.mcap", "-o", "x.png"], ["nothing.mcap"]),
         (["render", "nothing.mcap", "-o", "x.png"], ["nothing.mcap"]),
@@ -140,6 +141,12 @@ def test_info_shows_a_scenario_with_its_defaults_and_a_log(
     shown = " ".join(mjspace("info", flown[0]).stdout.split())
     assert "contraction-ideal" in shown
     assert "rate 3 [rad/s]" in shown
+
+
+def test_info_says_what_of_a_flight_is_compiled() -> None:
+    said = "compiled: sensors, law and actuators"
+    assert mjspace("info", "contraction-ideal", "--compiled").stdout == f"{said}\n"
+    assert json.loads(mjspace("info", "contraction-ideal", "--compiled", "--json").stdout) == said
 
 
 def test_replay_verifies_and_flies_another_law(
