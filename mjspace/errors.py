@@ -2,14 +2,12 @@
 
 import difflib
 import sys
-import sysconfig
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-_LIBRARIES = tuple(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
 _TESTBED = Path(__file__).parent
 
 
@@ -71,6 +69,13 @@ def place_of(error: Exception) -> str:
 
 
 def _is_users(path: Path) -> bool:
+    """Return whether it is a Python file outside the testbed and the libraries.
+
+    Frames of Cython and of ``eval`` have names such as "_common.pyx" and "<string>".
+    """
+    import sysconfig  # with its paths it takes 3 ms, which a start without an error need not
+
     if path.is_relative_to(_TESTBED):
         return path.is_relative_to(_TESTBED / "controllers")
-    return not any(path.is_relative_to(library) for library in _LIBRARIES)
+    libraries = (sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
+    return path.suffix == ".py" and not any(map(path.is_relative_to, libraries))

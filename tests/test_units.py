@@ -1,13 +1,15 @@
 """Units: conversion to SI, the unit beside a field, the unit of a plot."""
 
-from typing import Annotated, NamedTuple
+import copy
+import pickle
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from mjspace.contract import Array, Measurement, Reference, TorqueCommand, Trajectory, Truth
 from mjspace.log import topics
-from mjspace.units import UNITS, Unit, to_si, units_of
+from mjspace.units import UNITS, Quantity, Unit, to_si, units_of
 
 
 class Signals(NamedTuple):
@@ -77,3 +79,9 @@ def test_a_unit_outside_the_table_is_accepted_as_itself() -> None:
         to_si("0.5 deg", "s")
     with pytest.raises(ValueError, match="got the text '3 deg', should be a plain number"):
         to_si("3 deg", "")
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))])
+def test_copies_and_pickles_of_a_quantity_keep_its_unit(again: Any) -> None:
+    found = again(Quantity(0.5, "rad"))
+    assert (found, type(found), found.unit) == (0.5, Quantity, "rad")

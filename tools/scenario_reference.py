@@ -119,7 +119,8 @@ def _gain(field: Field[Any]) -> str:
     unit = f" ({stated})" if stated else ""
     if field.default_factory is not MISSING:
         return f"`{field.name}`{unit}: {field.default_factory().tolist()}"
-    return f"`{field.name}`{unit}" + ("" if field.default is MISSING else f": {field.default}")
+    default = '""' if field.default == "" else field.default
+    return f"`{field.name}`{unit}" + ("" if default is MISSING else f": {default}")
 
 
 def _tables(table: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:

@@ -188,6 +188,7 @@ class Cascade(Gains):
         """Return the motors' voltages for the desired speeds."""
         speed = _speeds(measurement)
         memory, wheel_speed = state.speed_memory, state.desired_wheel_speed
+        # A traced time cannot be rounded; with a loop in every inner period it need not be.
         if self.speed_steps == 1 or round(time / self.inner_period) % self.speed_steps == 0:
             memory, _ = self._speed_loop.step(
                 memory,

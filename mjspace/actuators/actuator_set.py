@@ -155,7 +155,7 @@ def _check(command: Any, takes: Fields, vehicles: int) -> None:
     for name, (width, unit) in takes.items():
         value = getattr(command, name, None)
         shape = (vehicles, *((width,) if isinstance(width, int) else width))
-        # Also an array that is traced, and no np.ndarray.
+        # By its attributes: a traced array is not an np.ndarray.
         if getattr(value, "shape", None) == shape and getattr(value, "dtype", None) == _FLOAT:
             continue  # in a quarter of a microsecond
         right = f"it must be of shape {_without_vehicles(shape)} [{unit}]"

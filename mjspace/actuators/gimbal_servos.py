@@ -100,9 +100,8 @@ class GimbalServos(HingeMotors):
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
         """Return (state, torque [N m], whether rate or torque saturates), (N, m), as the motors."""
-        gimbal_rate = 1.0 * np.reshape(command.gimbal_rate, truth.gimbal_rate.shape)
         wheel_speed = np.broadcast_to(self.wheel_speed, truth.wheel_speed.shape)
-        desired = np.concatenate([gimbal_rate, wheel_speed], axis=-1)
+        desired = np.concatenate([command.gimbal_rate, wheel_speed], axis=-1)
         rate = np.concatenate([truth.gimbal_rate, truth.wheel_speed], axis=-1)
         before = state["servo_integral"]
         integral, torque, saturated = _hold_speed.ufunc(before, desired, rate, self.loops, step)

@@ -54,5 +54,5 @@ class IdealThrusters(Actuator):
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
         """Return the commanded torque, body axes, (N, 3), which never saturates."""
-        torque = 1.0 * np.reshape(getattr(command, self.obeys), truth.rate.shape)
+        torque = getattr(command, self.obeys)
         return state, torque, np.zeros((len(torque), 0))

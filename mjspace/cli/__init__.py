@@ -1,4 +1,4 @@
-"""The command line: ``mjspace list | info | run | replay | render | plot | validate``.
+"""The command line: ``list``, ``info``, ``run``, ``replay``, ``render``, ``plot``, ``validate``.
 
 Exit status: 0 every check came out as the scenario expects, 1 flown but one did not (or a replay
 differed, or the flight ended early), 2 bad input. Modules are imported when a command needs them:

@@ -37,9 +37,9 @@ def info(
     as_json: Json = False,
 ) -> None:
     """Show a scenario in full, or what a log holds."""
-    if compiled and (as_json or target.endswith(".mcap")):
-        raise InputError("--compiled: answers in one line about a scenario, without --json")
     if target.endswith(".mcap"):
+        if compiled:
+            raise InputError(f"--compiled: {target} is a log: name its scenario instead")
         from mjspace.runner import report
 
         log = open_log(Path(target))
@@ -55,6 +55,7 @@ def info(
         from mjspace.simulation.assembly import assemble
         from mjspace.simulation.loop import what_is_compiled
 
-        print(what_is_compiled(assemble(scenario, folder)))
+        found = what_is_compiled(assemble(scenario, folder))
+        print(json.dumps(found) if as_json else found)
         return
     print(scenario.model_dump_json(indent=2) if as_json else to_toml(scenario).rstrip())

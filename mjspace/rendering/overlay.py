@@ -22,7 +22,7 @@ def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> None:
     margin, large, small = round(0.035 * height), max(11, height // 25), max(9, height // 36)
     upper, lower = height - margin - round(1.45 * small), height - margin
     top = max(upper - large - margin // 2, 0)
-    band = Image.fromarray(frame[top:])  # a copy of what changes alone
+    band = Image.fromarray(frame[top:])  # a copy, of the rows that change
     draw = ImageDraw.Draw(band, "RGBA")
     draw.rectangle((0, 0, width, height), fill=SHADE)
     for x, anchor, lines in ((margin, "ls", left), (width - margin, "rs", right)):

@@ -42,8 +42,8 @@ class CompiledBlocks:
         self._members, self._threads = members, threads
         self._stepper, self._law = stepper, law
         self._flight: CompiledFlight | None = None
-        effects = " and ".join(effect.name for effect in stepper.effects)
-        self.reason = f"{effects} can act between compiled steps in Python alone" if effects else ""
+        effects = ", ".join(effect.name for effect in stepper.effects)
+        self.reason = f"step effects are not compiled ({effects})" if effects else ""
         self.on = not effects
 
     def __str__(self) -> str:

@@ -42,8 +42,9 @@ class Deployment(Table):
         if part not in KINDS:
             raise ValueError(f"deployment: a {part} has none, a {' or a '.join(KINDS)} has")
         for kind, deployed in KINDS.items():
-            given = [getattr(self, key) is not None for key in deployed.needs]
-            if any(given) if kind != part else not all(given):
+            present = [getattr(self, key) is not None for key in deployed.needs]
+            fits = all(present) if kind == part else not any(present)
+            if not fits:
                 keys = " and ".join(deployed.needs)
                 raise ValueError(f"deployment: {keys} are a {kind}'s, and it needs them")
 

@@ -79,8 +79,8 @@ def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
     spec.nuserdata = userdata
 
-    on_bus = [fitted.rotors for fitted in table.equipment.values() if fitted.rotors is not None]
-    rotors = on_bus[0] if on_bus else mass_properties.Rotors()
+    on_bus = (fitted.rotors for fitted in table.equipment.values())
+    rotors = next(filter(None, on_bus), mass_properties.Rotors())
     if table.vehicle_mass is not None:
         gyrostat = np.array(table.vehicle_inertia)
         inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, _others(spec))

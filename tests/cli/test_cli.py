@@ -44,30 +44,6 @@ def test_help_and_list() -> None:
         assert description
 
 
-@pytest.mark.parametrize(
-    ("scenario", "line"),
-    [
-        ("contraction-ideal", "compiled: sensors, law and actuators"),
-        (
-            "dgvscmg-slow-loops",
-            "flown in Python: a Python number, or text, made of a measured value (dgvscmg.py:191), "
-            "and the law has an inner loop",
-        ),
-    ],
-)
-def test_info_says_what_is_compiled(scenario: str, line: str) -> None:
-    assert mjspace("info", scenario, *SHORT, "--compiled").stdout == f"{line}\n"
-
-
-@pytest.mark.parametrize("words", [("flight.mcap",), ("contraction-ideal", "--json")])
-def test_what_is_compiled_is_of_a_scenario_and_one_line(words: tuple[str, ...]) -> None:
-    done = mjspace("info", *words, "--compiled")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == (
-        "mjspace: --compiled: answers in one line about a scenario, without --json\n"
-    )
-
-
 def test_a_run_that_keeps_its_checks_ends_with_0(
     flown: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
@@ -125,6 +101,7 @@ def test_json_is_all_there_is(tmp_path: Path) -> None:
             ["environment.python"],
         ),
         (["info", "nothing.mcap"], ["nothing.mcap"]),
+        (["info", "nothing.mcap", "--compiled"], ["--compiled: nothing.mcap is a log"]),
         (["replay", "nothing.mcap"], ["nothing.mcap"]),
         (["plot", "nothing.mcap", "-o", "x.png"], ["nothing.mcap"]),
         (["render", "nothing.mcap", "-o", "x.png"], ["nothing.mcap"]),
@@ -164,6 +141,22 @@ def test_info_shows_a_scenario_with_its_defaults_and_a_log(
     shown = " ".join(mjspace("info", flown[0]).stdout.split())
     assert "contraction-ideal" in shown
     assert "rate 3 [rad/s]" in shown
+
+
+def test_info_says_what_of_a_flight_is_compiled() -> None:
+    said = "compiled: sensors, law and actuators"
+    assert mjspace("info", "contraction-ideal", "--compiled").stdout == f"{said}\n"
+    assert json.loads(mjspace("info", "contraction-ideal", "--compiled", "--json").stdout) == said
+
+
+def test_info_names_all_that_keeps_a_flight_in_python() -> None:
+    assert mjspace("info", "dgvscmg-slow-loops", *SHORT, "--compiled").stdout == (
+        "flown in Python: a Python number, or text, made of a measured value (dgvscmg.py:191), "
+        "and the law has an inner loop\n"
+    )
+    assert mjspace("info", "wheel-failure", "--compiled").stdout == (
+        "flown in Python: step effects are not compiled (the faults)\n"
+    )
 
 
 def test_replay_verifies_and_flies_another_law(
