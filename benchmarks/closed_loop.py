@@ -126,7 +126,12 @@ def many() -> None:
     for threads, aim in ((1, "1.08"), (2, "1.08")):
         times = paired(flight(vehicle, 256, threads), bare_batch(vehicle, 256, threads, steps))
         each = 1e6 * times.min(axis=0) / (256 * steps)
-        row(f"{threads} threads", *(f"{us:.1f}" for us in each), f"{ratio(times):.2f}", aim)
+        row(
+            f"{threads} thread{'s' * (threads > 1)}",
+            *(f"{us:.1f}" for us in each),
+            f"{ratio(times):.2f}",
+            aim,
+        )
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -150,9 +151,10 @@ def test_info_says_what_of_a_flight_is_compiled() -> None:
 
 
 def test_info_names_all_that_keeps_a_flight_in_python() -> None:
-    assert mjspace("info", "dgvscmg-slow-loops", *SHORT, "--compiled").stdout == (
-        "flown in Python: a Python number, or text, made of a measured value (dgvscmg.py:191), "
-        "and the law has an inner loop\n"
+    assert re.fullmatch(
+        r"flown in Python: a Python number, or text, made of a measured value \(dgvscmg\.py:\d+\), "
+        r"and the law has an inner loop\n",
+        mjspace("info", "dgvscmg-slow-loops", *SHORT, "--compiled").stdout,
     )
     assert mjspace("info", "wheel-failure", "--compiled").stdout == (
         "flown in Python: step effects are not compiled (the faults)\n"
