@@ -1,7 +1,7 @@
 """How the benchmarks measure: runs in turn, medians of their ratios, rows of a Markdown table."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,8 +12,8 @@ ROUNDS = 7
 Run = Callable[[], object]
 
 
-def alternating(*timers: Callable[[], float], rounds: int = ROUNDS) -> Array:
-    """Return what each timer returns in turn, after one round that does not count, (rounds, n).
+def alternating(*timers: Callable[[], float | Sequence[float]], rounds: int = ROUNDS) -> Array:
+    """Return what each timer returns in turn, after a round that does not count, (rounds, n, ...).
 
     Neighbours see the same machine, which others may slow down or speed up meanwhile.
     """
