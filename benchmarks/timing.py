@@ -22,7 +22,7 @@ def alternating(*timers: Callable[[], float | Sequence[float]], rounds: int = RO
 
 def paired(*runs: Run, rounds: int = ROUNDS) -> Array:
     """Return the wall time [s] of each of the runs in turn, (rounds, n)."""
-    return alternating(*(lambda run=run: seconds(run) for run in runs), rounds=rounds)  # type: ignore[misc]
+    return alternating(*(lambda run=run: seconds(run) for run in runs), rounds=rounds)
 
 
 def ratio(times: Array) -> float:
