@@ -11,6 +11,8 @@ import time
 import warnings
 from pathlib import Path
 
+from timing import head, row
+
 from mjspace.runner.recorder import Recorder
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
@@ -25,7 +27,7 @@ RATES = ((), ("log.default='100 Hz'", "log.state='1 s'"))
 def main() -> None:
     """Print the table."""
     warnings.simplefilter("ignore")
-    print(f"{'':40}{'MB':>6}{'flying':>10}{'log':>8}{'wall':>8}  us a control period")
+    head("us a control period", "file", "flying", "log", "wall")
     for rates in RATES:
         assembly = assemble(*load("contraction-adaptive", ["duration=20", *rates]))
         blocks = list(fly(assembly, first_start(assembly, [0])))
@@ -48,7 +50,7 @@ def report(name: str, assembly: Assembly, blocks: list[Block]) -> None:
         wall = time.perf_counter() - begin[2]
         size = path.stat().st_size / 1e6
     scale = 1e6 / sum(len(block.time) for block in blocks)
-    print(f"{name:40}{size:6.1f}{scale * flying:10.2f}{scale * log:8.2f}{scale * wall:8.2f}")
+    row(name, f"{size:.1f} MB", *(f"{scale * time:.2f}" for time in (flying, log, wall)))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
     python benchmarks/log_size.py [SECONDS]
 
 Three scenarios, each flown for SECONDS (5 when left out) with everything logged. Their chunks are
-compressed anew at each level of zstd; times are the least of ``ROUNDS`` passes.
+compressed anew at each level of zstd; times are the least of ``ROUNDS`` passes in turn.
 """
 
 import hashlib
@@ -12,13 +12,16 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import zstandard
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
+from timing import alternating, head, row
 
 import mjspace
+from mjspace.contract import Array
 from mjspace.log.chunk import LEVEL
 
 SCENARIOS = ("contraction-adaptive", "dgvscmg-tracking", "lander")
@@ -49,16 +52,17 @@ def report(scenario: str, chunks: list[bytes], rows: int) -> None:
     """Print size and times for each of ``rows`` control periods, by level."""
     size = sum(map(len, chunks)) / rows
     print(f"{scenario}: {size:.0f} bytes a row, {rows} rows in {len(chunks)} chunks")
-    sums = microseconds(zlib.crc32, chunks, rows), microseconds(digest, chunks, rows)
-    print(f"  CRC {sums[0]:.2f} us, SHA-256 {sums[1]:.2f} us a row")
-    print(f"  {'level':>5}{'bytes':>8}{'ratio':>7}{'pack us':>9}{'unpack us':>11}")
+    sums = microseconds(rows, (zlib.crc32, chunks), (digest, chunks))
+    print(f"CRC {sums[0]:.2f} us, SHA-256 {sums[1]:.2f} us a row\n")
+    head("level", "bytes", "ratio", "pack us", "unpack us")
     for level in LEVELS:
         packer = zstandard.ZstdCompressor(level=level, write_checksum=True)
         packed = [packer.compress(chunk) for chunk in chunks]
         least = sum(map(len, packed)) / rows
-        times = microseconds(packer.compress, chunks, rows), microseconds(unpack, packed, rows)
-        mark = "  <- the log's" if level == LEVEL else ""
-        print(f"  {level:5}{least:8.0f}{size / least:7.2f}{times[0]:9.2f}{times[1]:11.2f}{mark}")
+        times = microseconds(rows, (packer.compress, chunks), (unpack, packed))
+        name = f"{level}, the log's" if level == LEVEL else f"{level}"
+        row(name, f"{least:.0f}", f"{size / least:.2f}", *(f"{us:.2f}" for us in times))
+    print()
 
 
 def digest(content: bytes) -> bytes:
@@ -71,15 +75,19 @@ def unpack(packed: bytes) -> bytes:
     return zstandard.decompress(packed)
 
 
-def microseconds(work: Callable[[bytes], object], blocks: list[bytes], rows: int) -> float:
-    """Return the processor time [us] of ``work`` on all ``blocks``, for each of ``rows``."""
-    passes = []
-    for _ in range(ROUNDS):
-        begin = time.thread_time()
-        for block in blocks:
-            work(block)
-        passes.append(time.thread_time() - begin)
-    return 1e6 * min(passes) / rows
+def microseconds(rows: int, *works: tuple[Callable[[bytes], object], list[bytes]]) -> Array:
+    """Return the processor time [us] of each work on all of its blocks, for each of ``rows``."""
+    timers = (partial(processor_seconds, *work) for work in works)
+    least: Array = alternating(*timers, rounds=ROUNDS).min(axis=0)
+    return 1e6 * least / rows
+
+
+def processor_seconds(work: Callable[[bytes], object], blocks: list[bytes]) -> float:
+    """Return the processor time [s] of ``work`` on all ``blocks``."""
+    begin = time.thread_time()
+    for block in blocks:
+        work(block)
+    return time.thread_time() - begin
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a start takes: each command as a process of its own, once and then ROUNDS times in turn.
+"""What a start takes: each command as a process of its own, in turn; medians of ROUNDS.
 
 ``python benchmarks/start.py [ROUNDS]``, 7 when left out. CPU is the processor time of all threads.
 """
@@ -9,8 +9,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from statistics import median
+
+import numpy as np
+from timing import ROUNDS, alternating, head, row
 
 MJSPACE = (sys.executable, "-m", "mjspace")
 RUN = (*MJSPACE, "run", "contraction-ideal", "--duration", "2", "--out")
@@ -28,21 +31,14 @@ COMMANDS = {
 
 def main() -> None:
     """Print the table."""
-    rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 7
+    rounds = int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS
     with tempfile.TemporaryDirectory() as folder:
-        words = {
-            name: (*command, folder) if command is RUN else command
-            for name, (command, _) in COMMANDS.items()
-        }
-        for command in words.values():
-            spent(command)
-        runs = [{name: spent(command) for name, command in words.items()} for _ in range(rounds)]
+        commands = [(*c, folder) if c is RUN else c for c, _ in COMMANDS.values()]
+        times = alternating(*(partial(spent, command) for command in commands), rounds=rounds)
     stored = Path(__file__).parents[1].glob("mjspace/__pycache__/*.pyc")
-    print(f"byte code {'stored' if any(stored) else 'not stored'}, medians of {rounds} [s]")
-    print(f"{'':46}{'wall':>7}{'CPU':>7}{'aim':>7}")
-    for name, (_, aim) in COMMANDS.items():
-        wall, processor = (median(run[name][i] for run in runs) for i in range(2))
-        print(f"{name:46}{wall:7.2f}{processor:7.2f}{'' if aim is None else f'{aim:7.2f}'}")
+    head(f"[s], byte code {'stored' if any(stored) else 'not stored'}", "wall", "CPU", "aim")
+    for (name, (_, aim)), spans in zip(COMMANDS.items(), np.median(times, axis=0), strict=True):
+        row(name, *(f"{s:.2f}" for s in spans), "" if aim is None else f"{aim:g}")
 
 
 def spent(command: Sequence[str]) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """How the benchmarks measure: runs in turn, medians of their ratios, rows of a Markdown table."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,8 +12,8 @@ ROUNDS = 7
 Run = Callable[[], object]
 
 
-def alternating(*timers: Callable[[], float], rounds: int = ROUNDS) -> Array:
-    """Return what each timer returns in turn, after one round that does not count, (rounds, n).
+def alternating(*timers: Callable[[], float | Sequence[float]], rounds: int = ROUNDS) -> Array:
+    """Return what each timer returns in turn, after a round that does not count, (rounds, n, ...).
 
     Neighbours see the same machine, which others may slow down or speed up meanwhile.
     """
@@ -22,7 +22,7 @@ def alternating(*timers: Callable[[], float], rounds: int = ROUNDS) -> Array:
 
 def paired(*runs: Run, rounds: int = ROUNDS) -> Array:
     """Return the wall time [s] of each of the runs in turn, (rounds, n)."""
-    return alternating(*(lambda run=run: seconds(run) for run in runs), rounds=rounds)  # type: ignore[misc]
+    return alternating(*(lambda run=run: seconds(run) for run in runs), rounds=rounds)
 
 
 def ratio(times: Array) -> float:

@@ -38,9 +38,9 @@ def find_signal(topics: Topics, signal: str) -> tuple[str, str, slice]:
 
 
 def by_topic(fields: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """Return ``fields``, each with its topic before it, as the fields of each topic."""
+    """Return ``fields``, each with its topic before it, as the fields of each topic, each once."""
     found: dict[str, list[str]] = {}
-    for topic, field in fields:
+    for topic, field in dict.fromkeys(fields):
         found.setdefault(topic, []).append(field)
     return found
 

@@ -49,10 +49,16 @@ class Law:
 
 
 @pytest.fixture
-def failing_law(tmp_path: Path) -> Callable[[float], None]:
-    """Write ``law.py`` with a class ``Law`` that commands no torque and raises after a time [s]."""
+def failing_law(tmp_path: Path) -> Callable[..., Path]:
+    """Write a scenario in which a law in ``law.py`` commands no torque and raises after a time [s].
 
-    def write(time: float) -> None:
+    Returned is its path; ``before`` is what stands in it before the table of the law.
+    """
+
+    def write(time: float, before: str = 'base = "detumble-wheels"\nchecks = []\n') -> Path:
         (tmp_path / "law.py").write_text(_FAILING_LAW.format(time=time))
+        path = tmp_path / "x.toml"
+        path.write_text(f'{before}[law]\nkind = "law.py:Law"\n')
+        return path
 
     return write

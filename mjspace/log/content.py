@@ -101,7 +101,7 @@ def read_content(file: BinaryIO, place: ChunkPlace, channels: Collection[int]) -
     if place.indexes is None:
         return Content(data, _walked(data, channels))
     offsets = {channel: _indexed(file, place.indexes[channel]) for channel in channels}
-    if any(int(at.max(initial=0)) + RECORD.size > len(data) for at in offsets.values() if len(at)):
+    if any(int(at.max()) + RECORD.size > len(data) for at in offsets.values() if len(at)):
         raise ValueError(f"the index of the chunk at byte {place.position} is damaged")
     return Content(data, offsets)
 

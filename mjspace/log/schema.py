@@ -26,7 +26,7 @@ PERIODIC = {
     "/law": "mjspace.LawSignals",
     "/disturbance": "mjspace.Disturbance",
 }
-"""Topics written at every control period, with their messages' names."""
+"""Topics with a row at every control period, or every n-th, with their messages' names."""
 
 _FOXGLOVE: dict[str, Any] = {"/tf": FrameTransforms, "/scene": SceneUpdate, "/events": Log}
 

@@ -44,11 +44,11 @@ def figure(log: Log, x: str, y: str) -> Figure:
     Where thrusters fired, the path has the color of those that did; dots are where that changed.
     """
     places = [_component(log, signal) for signal in (x, y)]
-    fields = by_topic((topic, field) for topic, field, _ in places)
+    fields = [(topic, field) for topic, field, _ in places]
     has_thrusters = bool(log.topics.get("/command", {}).get("on_time"))
     if has_thrusters:
-        fields.setdefault("/command", []).append("on_time")
-    rows = _together(log.read_topics(fields))
+        fields.append(("/command", "on_time"))
+    rows = _together(log.read_topics(by_topic(fields)))
     (across, x_label), (up, y_label) = (
         _values(log, rows, signal, place) for signal, place in zip((x, y), places, strict=True)
     )

@@ -107,14 +107,10 @@ def test_no_command_has_a_traceback_of_a_log_cut_anywhere(command: Command, whol
 
 
 def test_a_law_that_raises_in_its_reset_is_one_line_with_its_place(
-    command: Command, failing_law: Callable[[float], None]
+    command: Command, failing_law: Callable[..., Path]
 ) -> None:
     """As where it refuses what is measured in the middle of a flight."""
-    failing_law(1.0)
-    Path("x.toml").write_text(
-        'base = "detumble-wheels"\nduration = 0.05\nchecks = []\n[law]\nkind = "law.py:Law"\n'
-    )
-    log = run("x.toml", out="flown").path
+    log = run(failing_law(1.0), overrides=["duration=0.05"], out="flown").path
     law = Path("law.py").read_text().replace("return None\n", 'raise ArithmeticError("no")\n', 1)
     rewritten(log, Path("x.mcap"), attachments={"law.py": law.encode()})
     for rest in (("--verify",), ("--out", "out", "--from", "0.02")):

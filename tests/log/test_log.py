@@ -173,6 +173,16 @@ def test_the_nearest_row_is_found_across_chunks(flown: Path, asked: float, found
     assert row["attitude_error"] == values["/truth"]["attitude_error"][found]
 
 
+def test_the_nearest_row_may_stand_before_a_chunk_that_begins_with_an_earlier_event(
+    tmp_path: Path,
+) -> None:
+    with create(tmp_path / "flight.mcap") as log:
+        log.write(*rows(0, 7))
+        log.event(0.0055, "INFO", "before the last row of the first chunk")
+        log.write(*rows(7, 7))
+    assert Log(tmp_path / "flight.mcap").nearest("/truth", 0.0062)["time"] == 0.006
+
+
 def test_times_are_refused_one_by_one_and_a_window_may_be_open(tmp_path: Path) -> None:
     for time in ([0.0, -1e-3], [0.002, 0.002], [0.0, 0.002, 0.001], [0.0, np.nan]):
         with create(tmp_path / "refused.mcap") as log:

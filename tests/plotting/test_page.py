@@ -10,6 +10,7 @@ from PIL import Image
 
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.plotting import decimate
 from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.plotting.decimate import Line, outlines
 from mjspace.plotting.page import figure, plot
@@ -141,6 +142,16 @@ def test_a_few_points_keep_the_extremes(log: Log) -> None:
         at = np.searchsorted(whole["time"], time[:, component])
         np.testing.assert_array_equal(whole["torque"][at, component], value[:, component])
         assert (np.diff(time[:, component]) >= 0.0).all()
+
+
+def test_a_line_is_the_same_whatever_number_of_rows_is_searched_at_once(
+    log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = [Line("/command", "torque"), Line("/truth", "rate")]
+    whole = outlines(log, lines, points=400)
+    monkeypatch.setattr(decimate, "_TOGETHER", 100)
+    for one, other in zip(outlines(log, lines, points=400), whole, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_the_log_is_read_once(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from mjspace.errors import InputError
 from mjspace.runner.checks import Judge, Verdict, refuse_other_dimensions, refuse_unknown
 from mjspace.scenario.scenario import Check, EventTable
-from mjspace.signals import find_signal
+from mjspace.signals import by_topic, find_signal
 from mjspace.units import Unit
 
 
@@ -301,3 +301,8 @@ def test_a_matrix_is_its_numbers_row_by_row(signal: str, part: tuple[int, int]) 
     for wrong in ("truth.m[6]", "truth.m[3:3]", "truth.m[2:7]"):
         with pytest.raises(ValueError, match="6 components"):
             find_signal(topics, wrong)
+
+
+def test_a_topic_has_each_of_its_fields_once() -> None:
+    fields = [("/truth", "rate"), ("/law", "e"), ("/truth", "rate"), ("/truth", "attitude")]
+    assert by_topic(fields) == {"/truth": ["rate", "attitude"], "/law": ["e"]}

@@ -190,14 +190,10 @@ def test_a_log_cut_short_ends_with_its_most_frequent_topic(slower: Log, tmp_path
 
 
 def test_a_flight_that_breaks_off_has_its_last_row_on_each_topic(
-    tmp_path: Path, failing_law: Callable[[float], None]
+    tmp_path: Path, failing_law: Callable[..., Path]
 ) -> None:
-    failing_law(0.0505)
-    (tmp_path / "x.toml").write_text(
-        'base = "detumble-wheels"\nduration = 0.1\nchecks = []\n[law]\nkind = "law.py:Law"\n'
-        '[log]\ndefault = "20 ms"\n'
-    )
-    result = run(tmp_path / "x.toml", out=tmp_path)
+    rates = ["duration=0.1", "log.default='20 ms'"]
+    result = run(failing_law(0.0505), overrides=rates, out=tmp_path)
     assert result.trouble
     for topic in result.log.topics:
         assert result.log.read(topic)["time"].tolist() == [0.0, 0.02, 0.04, 0.05]

@@ -120,6 +120,8 @@ def test_a_log_from_before_fields_were_renamed_flies_again(
 def test_a_field_of_ones_own_keeps_its_name() -> None:
     own = {"/law": {"wanted": 1, "given": 2}, "/state": {"law_given": 3}}
     assert as_logged(own, own) == own
+    both = {"/law": {"desired_speed": 1, "wanted": 2}}
+    assert as_logged(both, both) == both
     now = {"/law": {"desired_speed": 1}, "/state": {"law_applied_torque": 3, "physics": 4}}
     assert as_logged(now, now) == now
     before = {"/law": {"wanted": 1}, "/state": {"law_given": 3, "physics": 4}}

@@ -47,14 +47,12 @@ def test_progress_is_the_time_of_each_block_and_the_verdict_of_the_whole_log(
 
 
 def test_a_flight_that_breaks_off_fails_though_its_checks_hold(
-    tmp_path: Path, failing_law: Callable[[float], None]
+    tmp_path: Path, failing_law: Callable[..., Path]
 ) -> None:
-    failing_law(0.0505)
-    (tmp_path / "x.toml").write_text(
-        'base = "detumble-wheels"\nduration = 0.1\nchecks = []\n[law]\nkind = "law.py:Law"\n'
-    )
     told: list[float] = []
-    result = run(tmp_path / "x.toml", out=tmp_path, progress=told.append)
+    result = run(
+        failing_law(0.0505), overrides=["duration=0.1"], out=tmp_path, progress=told.append
+    )
     assert all(verdict.as_expected for verdict in result.verdicts)
     assert not result.passed
     assert "the law raised ArithmeticError" in result.trouble

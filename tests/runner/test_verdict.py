@@ -106,21 +106,16 @@ def test_a_flight_that_ends_early_fails_whatever_its_checks(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-    failing_law: Callable[[float], None],
+    failing_law: Callable[..., Path],
 ) -> None:
-    failing_law(0.0205)
-    (tmp_path / "x.toml").write_text(
-        SCENARIO + FAST.format(above=0.5) + FAILS + '[law]\nkind = "law.py:Law"\n'
-    )
-    status = mjspace(
-        "run", tmp_path / "x.toml", "--out", tmp_path, "--json", monkeypatch=monkeypatch
-    )
+    scenario = failing_law(0.0205, before=SCENARIO + FAST.format(above=0.5) + FAILS)
+    status = mjspace("run", scenario, "--out", tmp_path, "--json", monkeypatch=monkeypatch)
     found = json.loads(capsys.readouterr().out)
     assert all(check["as_expected"] for check in found["checks"])
     assert "no way on" in found["trouble"]
     assert found["passed"] is False
     assert status == 1
-    assert mjspace("run", tmp_path / "x.toml", "--out", tmp_path, monkeypatch=monkeypatch) == 1
+    assert mjspace("run", scenario, "--out", tmp_path, monkeypatch=monkeypatch) == 1
     assert "ended early" in capsys.readouterr().out
 
 
