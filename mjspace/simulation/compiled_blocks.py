@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,17 +43,25 @@ class CompiledBlocks:
         self._members, self._threads = members, threads
         self._stepper, self._law = stepper, law
         self._flight: CompiledFlight | None = None
-        effects = ", ".join(effect.name for effect in stepper.effects)
-        self.reason = f"step effects are not compiled ({effects})" if effects else ""
-        self.on = not effects
+        self.reason = ", and ".join(
+            f"{effect.name}: {effect.not_compiled}"
+            for effect in stepper.effects
+            if effect.not_compiled
+        )
+        self.on = not self.reason
 
     def __str__(self) -> str:
         """Return what is compiled, in one line."""
         if not self.on:
             return f"flown in Python: {self.reason}"
         if self.reason:
-            return f"actuators compiled; sensors and law called in Python: {self.reason}"
-        return "compiled: sensors, law and actuators"
+            also = " and step effects" if self._stepper.effects else ""
+            return f"actuators{also} compiled; sensors and law called in Python: {self.reason}"
+        effects = self._stepper.effects
+        if not effects:
+            return "compiled: sensors, law and actuators"
+        names = ", ".join(effect.name for effect in effects)
+        return f"compiled: sensors, law, actuators and step effects ({names})"
 
     def fly(
         self,
@@ -70,13 +79,21 @@ class CompiledBlocks:
         Python flies on. ``stop`` is called in each period in which the law is called in Python.
         """
         after, trouble = self._after_a_period(), None
+        second = after._replace(memory=self._stepper.observed(first.number + 1))
         try:
             flight = self._flight or self._compile(first, desired)
             flight.set(first.physics, first.memory, first.sensors, first.law)
             flight.begin(first.number, count, last)
             if flight.has_law:
                 flight.fly(desired)
-                compiled = flight.columns()
+                stopped = int(flight.stopped.min())
+                if stopped == 1:
+                    return columns, None
+                if stopped < count:  # Python flies the period in which something is told
+                    flight.set(first.physics, first.memory, first.sensors, first.law)
+                    flight.begin(first.number, stopped, last)
+                    flight.fly(desired)
+                compiled = replace(flight.columns(), events=columns.events)
             else:
                 compiled, trouble = self._fly_law_in_python(flight, first, count, desired, stop)
         except (Untraceable, SimulationError) as error:
@@ -85,7 +102,7 @@ class CompiledBlocks:
         if flight.warned:
             self._off("MuJoCo warned", after)
             return columns, None
-        different = _difference(columns, compiled) or after.difference(compiled)
+        different = _difference(columns, compiled) or second.difference(compiled)
         if different:
             warnings.warn(
                 f"compiled, {different} differs from what Python computes at t = "
@@ -121,6 +138,7 @@ class CompiledBlocks:
         rows: Any = zip(*(array[1:count] for array in desired), strict=True)
         for number, row in enumerate(rows, first.number + 1):
             self._take(flight)
+            before = self._after_a_period()
             period = self._stepper.sense(number)
             try:
                 period.law, period.command, period.signals = self._law.step(
@@ -130,12 +148,17 @@ class CompiledBlocks:
             except FlightError as error:
                 trouble = stopped_at(period.time, error)
                 break
+            flight.remember(period.memory)
             flight.fly_period(period.command)
+            if flight.stopped.min() == 0:  # Python flies the period in which something is told
+                self._go_back_to(before)
+                flight.set(before.physics, before.memory, before.sensors, before.law)
+                break
             recording.write(period)
             if stop():
                 break
         of_law, columns = recording.columns(), flight.columns()
-        return Columns(of_law.groups | columns.groups, [], of_law.kinds), trouble
+        return Columns(of_law.groups | columns.groups, of_law.events, of_law.kinds), trouble
 
     def _take(self, flight: CompiledFlight) -> None:
         """Put the stepper where the compiled flight is."""
@@ -148,7 +171,7 @@ class CompiledBlocks:
         Raises:
             Untraceable: not even the actuators can be compiled.
         """
-        arguments = self._assembly, self._stepper.layout, example
+        arguments = self._assembly, self._stepper.layout, self._stepper.effects, example
         reference = type(desired)(*(each[0] for each in desired))
         try:
             period = compile_period(*arguments, reference, law=True)
@@ -161,6 +184,7 @@ class CompiledBlocks:
         self._flight = CompiledFlight(
             self._assembly,
             self._stepper.layout,
+            self._stepper.effects,
             period,
             self._start,
             self._members,
@@ -175,9 +199,13 @@ class CompiledBlocks:
     def _off(self, reason: str, after: "_After") -> None:
         """Let Python fly on from ``after`` the first period."""
         self.on, self.reason, self._flight = False, reason, None
+        self._go_back_to(after)
+
+    def _go_back_to(self, then: "_After") -> None:
+        """Put stepper and law where they were ``then``, after another period."""
         stepper = self._stepper
-        stepper.batch.state[...] = after.physics
-        stepper.memory, stepper.sensors, self._law.state = after[1:]
+        stepper.batch.state[...] = then.physics
+        stepper.memory, stepper.sensors, self._law.state = then[1:]
 
 
 def stopped_at(time: float, error: Exception) -> FlightError:

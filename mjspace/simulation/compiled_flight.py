@@ -15,6 +15,7 @@ from mjspace.simulation.period_program import Copies, PeriodProgram, Recorded
 from mjspace.simulation.recording import Columns
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
+from mjspace.vehicle.step_effect import StepEffect
 
 _WORD = 8  # bytes
 
@@ -27,6 +28,8 @@ class CompiledFlight:
         memory: what the actuators remember, by name, (N, ...).
         sensors: what the sensors remember, likewise.
         law: the law's state, a named tuple of arrays (N, ...), or empty.
+        stopped: how many periods of the block each has flown, (N,): it stops before one in which a
+            step effect has an event to tell.
         command: the law's command, arrays (N, ...), where the period begins with it.
     """
 
@@ -34,6 +37,7 @@ class CompiledFlight:
         self,
         assembly: Assembly,
         layout: StateLayout,
+        effects: Sequence[StepEffect],
         period: PeriodProgram,
         start: Start,
         members: Sequence[int],
@@ -41,8 +45,11 @@ class CompiledFlight:
     ) -> None:
         """Put them into a batch with the fields of MuJoCo's model of the ``start``."""
         self._assembly, self._layout, self._period = assembly, layout, period
+        self._effects = effects
         vehicles = len(start.physics)
-        self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model)
+        # Threads that write masses, and derive what follows from them, have models of their own.
+        own = {each.array for each in period.masses} | ({"bvh_aabb"} if period.masses else set())
+        self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model, own)
         self._suite = assembly.sensors(members)
         self.physics = self._batch.state
         made = () if period.has_law else period.command
@@ -63,6 +70,7 @@ class CompiledFlight:
         self._record_places, self._record_size = _packed(
             [*(each.array for each in (*period.before, *period.after)), period.saturated]
         )
+        self.stopped = np.zeros(vehicles, np.int64)
         self._tables: list[np.ndarray] = []
         self._orders = self._constant_orders(remembered, places)
         self._function = block_function().address
@@ -72,27 +80,32 @@ class CompiledFlight:
     ) -> None:
         """Put the vehicles there, with what is remembered."""
         self.physics[...] = physics
-        for own, others in ((self.memory, memory), (self.sensors, sensors)):
-            for name, values in own.items():
-                values[...] = others[name]
+        self.remember(memory)
+        for name, values in self.sensors.items():
+            values[...] = sensors[name]
         for target, values in zip(self.law, law, strict=True):
             target[...] = values
+
+    def remember(self, memory: dict[str, Array]) -> None:
+        """Let actuators and step effects remember that."""
+        for name, values in self.memory.items():
+            values[...] = memory[name]
 
     def begin(self, first: int, count: int, last: int) -> None:
         """Begin a block of ``count`` periods from number ``first`` on.
 
-        The flight's ``last`` is not flown.
+        The flight's ``last`` is not flown. What the first tells is ignored: Python tells it.
         """
         self._first, self._flown = first, 0
         self._recorded = np.empty((count, len(self.physics), self._record_size), np.uint8)
         orders = self._orders
-        orders["last"] = last
+        orders["last"], orders["reported"] = last, first
         orders["period_stride"], orders["vehicle_stride"] = self._recorded.strides[:2]
 
     def fly(self, desired: DesiredMotion) -> None:
         """Fly the whole block with its law; ``desired`` has at least a row for each period.
 
-        A warning of MuJoCo's is left to be found in ``warned``.
+        A warning of MuJoCo's is left to be found in ``warned``, and an event in ``stopped``.
 
         Raises:
             mujoco.batch.SimulationError: MuJoCo raised an error.
@@ -116,7 +129,7 @@ class CompiledFlight:
         self._fly(count)
 
     def fly_period(self, command: Any) -> None:
-        """Fly the next period of the block under the law's ``command``.
+        """Fly the next period of the block under the law's ``command``, as ``fly`` does.
 
         Raises:
             mujoco.batch.SimulationError: as ``fly``.
@@ -129,8 +142,9 @@ class CompiledFlight:
         orders, recorded = self._orders, self._recorded
         orders["first"], orders["count"] = self._first + self._flown, count
         orders["record"] = recorded.ctypes.data + self._flown * recorded.strides[0]
+        self.stopped[:] = count
         self._batch.apply(self._function, orders.ctypes.data)
-        self._flown += count
+        self._flown += int(self.stopped.min())
 
     @property
     def has_law(self) -> bool:
@@ -156,7 +170,9 @@ class CompiledFlight:
         if period.has_law:
             state, memory = groups["physics"][""], groups["memory"]
             if not self._suite.ticks:
-                truth = truth_of(state, memory, self._layout, self._assembly.actuators, ())
+                truth = truth_of(
+                    state, memory, self._layout, self._assembly.actuators, self._effects
+                )
                 reports = self._suite.report({}, truth)._asdict()
                 groups["measurement"] = {name: a for name, a in reports.items() if a.size}
             for name in ("law", "signals", "sensors"):
@@ -167,29 +183,25 @@ class CompiledFlight:
         """Return the orders with all that is the same in every block."""
         period, assembly = self._period, self._assembly
         rates, model = assembly.scenario.rates, assembly.vehicle.model
-        _, words_of = struct_offsets.find()
+        words_of_model, words_of = struct_offsets.find()
         orders = np.zeros((), ORDERS)
-        for name in ("step", "forward"):
-            orders[name] = address(f"mj_{name}")
-        orders["get_state"], orders["state"] = address("mj_getState"), int(INTEGRATION)
-        orders["steps"], orders["stepwise"] = rates.steps, assembly.driven_stepwise
+        for name, function in (
+            *(("step", "step"), ("step1", "step1"), ("forward", "forward")),
+            *(("set_const", "setConst"), ("get_state", "getState"), ("set_state", "setState")),
+        ):
+            orders[name] = address(f"mj_{function}")
+        orders["state"] = int(INTEGRATION)
+        orders["steps"], orders["driven"] = rates.steps, assembly.driven_stepwise
+        orders["prepared"] = any(effect.every_step for effect in self._effects)
         orders["control"], orders["physics"] = rates.control, rates.physics
-        sensing, driving = period.sensing, period.driving
-        shifted = driving.table.copy()
-        shifted[:, 2:] += len(sensing.words)
         drives = [kind.drives for kind in assembly.actuators.kinds]
         tables = {
             "memory": period.program.memory.view(np.int64),
-            "words": np.concatenate([sensing.words, driving.words]),
-            "relative": np.concatenate([sensing.relative, driving.relative]),
-            "sensing": sensing.table,
-            "driving": shifted,
+            **self._sections(),
             "remembered": _table(
                 (self._offset(each), place, each.nbytes)
                 for each, place in zip(remembered, places, strict=True)
             ),
-            "after_sensing": self._copies(period.after_sensing),
-            "after_driving": self._copies(period.after_driving),
             "applied": _table(
                 (
                     getattr(words_of, driven.array),
@@ -198,6 +210,15 @@ class CompiledFlight:
                     values.nbytes,
                 )
                 for driven, values in zip(drives, period.applied, strict=True)
+            ),
+            "masses": _table(
+                (
+                    getattr(words_of_model, each.array),
+                    _WORD * each.first,
+                    self._offset(each.values),
+                    each.values.nbytes,
+                )
+                for each in period.masses
             ),
             "before": self._record_table(period.before, self._record_places),
             "after": self._record_table(period.after, self._record_places[len(period.before) :]),
@@ -214,7 +235,31 @@ class CompiledFlight:
         orders["sensors"] = self._offset(period.sensordata)
         orders["sensors_word"] = words_of.sensordata
         orders["sensors_size"] = period.sensordata.nbytes
+        for name in ("body_mass", "body_parentid", "body_subtreemass"):
+            orders[name] = getattr(words_of_model, name)
+        orders["bodies"], orders["most_constraints"] = (
+            model.nbody,
+            struct_offsets.most_constraints(),
+        )
+        orders["looks"] = any(effect.looks for effect in self._effects)
+        orders["looks_first"] = orders["looks"] and period.has_law  # else Python has looked
+        orders["report"] = self._offset(period.report), period.report.size
+        orders["stopped"] = self.stopped.ctypes.data
         return orders
+
+    def _sections(self) -> dict[str, np.ndarray]:
+        """Return the tables of the program's sections, whose words follow one another."""
+        period, tables = self._period, dict[str, np.ndarray]()
+        words, relative, used = [], [], 0
+        for name in ("looking", "sensing", "driving", "preparing"):
+            calls, after = getattr(period, name)
+            tables[name] = calls.table + np.array([0, 0, used, used, used])
+            tables[f"after_{name}"] = self._copies(after)
+            words.append(calls.words)
+            relative.append(calls.relative)
+            used += len(calls.words)
+        tables["words"], tables["relative"] = np.concatenate(words), np.concatenate(relative)
+        return tables
 
     def _offset(self, array: np.ndarray) -> int:
         return self._period.program.offset(array)

@@ -8,7 +8,7 @@ import ctypes
 import functools
 import sys
 import weakref
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -68,9 +68,17 @@ class NativeBatch:
     """
 
     def __init__(
-        self, model: Any, vehicles: int, threads: int, fields: Mapping[str, Array]
+        self,
+        model: Any,
+        vehicles: int,
+        threads: int,
+        fields: Mapping[str, Array],
+        own: Collection[str] = (),
     ) -> None:
         """Make it; ``fields`` of the model differ between vehicles, (N, ...).
+
+        Each thread has its ``own`` copy of other fields, and of all that MuJoCo derives from them:
+        a function that is applied may change both, and finds the fields anew at each vehicle.
 
         Raises:
             ValueError: MuJoCo cannot make it.
@@ -95,7 +103,9 @@ class NativeBatch:
         for name, values in fields.items():
             at = library().mjb_expand(self._batch, name.encode(), None, None)
             self._array(at, ctypes.c_double, values.shape)[...] = values
-        if fields:
+        for name in own:
+            library().mjb_expand(self._batch, name.encode(), None, None)
+        if fields or own:
             self._check(library().mjb_setConst(self._batch, None, 0))
 
     def apply(self, function: int, argument: int) -> None:

@@ -3,6 +3,8 @@
 from abc import ABC
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from mjspace.contract import Array, Event, Measurement
 
 State = dict[str, Array]
@@ -45,6 +47,9 @@ class StepEffect(ABC):
 
     In a control period the order is: ``observe``; the sensors and the law; ``at_control``; then for
     each integration step the actuators, ``change``, ``before_step``, MuJoCo, ``after_step``.
+
+    Where an effect is compiled, its methods of array code (``look``, ``add_to_truth``, ``change``,
+    ``masses``) are taken down and stand for the others in each period in which it reports nothing.
     """
 
     name: ClassVar[str]
@@ -53,6 +58,10 @@ class StepEffect(ABC):
     """Whether it acts in every integration step; else only in the first of a control period."""
     needs_truth: ClassVar[bool] = False
     """Whether it needs the whole truth in every integration step, and not turning alone."""
+    not_compiled: str = "it is called in Python"
+    """Why a flight with it is flown in Python; "" where it is compiled."""
+    looks: ClassVar[bool] = False
+    """Whether it has a ``look``, at each control instant and integration step."""
     wrench: Array | None = None
     """Force [N], inertial axes, and torque [N m], body axes, on the bus during the step that
     ``before_step`` has prepared, (N, 6). Those of all effects are added up, applied and logged in
@@ -97,6 +106,20 @@ class StepEffect(ABC):
         state the end of the step.
         """
         return memory
+
+    def look(self, memory: State, physics: Array, sensordata: Array) -> tuple[State, Array]:
+        """Return (memory, report) from the state ``physics`` (N, nstate) and its sensors (N, k).
+
+        Of a compiled effect. The report (N, 1) is True where there is an event to be told.
+        """
+        return memory, np.zeros((len(physics), 1), bool)
+
+    def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
+        """Return each field of MuJoCo's model that it changes, its body and the values (N, ...).
+
+        Of a compiled effect, for the step in which the actuators lead from ``before`` to ``after``.
+        """
+        return []
 
     def logged(self, memory: State, sensordata: Array) -> dict[str, Array]:
         """Return fields of /truth that it adds to the log, (n, N, k), from rows of a flight."""
