@@ -56,11 +56,10 @@ ORDERS = np.dtype([
     ("saturated_record", _NUMBER),
     # MuJoCo's sensors: in the memory, word of mjData, size
     ("sensors", _NUMBER), ("sensors_word", _NUMBER), ("sensors_size", _NUMBER),
-    # 1 where step effects look at what touches, also at control instants; what they report, in the
-    # memory; the period in which a report is ignored; where the first other one is noted of each
-    # vehicle
-    ("looks", _NUMBER), ("looks_first", _NUMBER), ("report", *_TABLE), ("reported", _NUMBER),
-    ("stopped", _NUMBER),
+    # 1 where step effects look at what touches, also at control instants; what they report in a
+    # section, in the memory; where the period of the first report is noted of each vehicle
+    ("looks", _NUMBER), ("looks_first", _NUMBER), ("told_looking", *_TABLE),
+    ("told_sensing", *_TABLE), ("told_preparing", *_TABLE), ("stopped", _NUMBER),
 ])  # fmt: skip
 """What is flown; places in a memory are offsets [bytes], sizes are in bytes."""
 _ORDERS = from_dtype(ORDERS)
@@ -149,12 +148,17 @@ def _step_burning(
 
 
 @njit
-def _look(orders: Any, looking: Any, words: Any, base: int, fields: Any, number: int) -> Any:
-    """Let step effects look at MuJoCo's sensors; return whether they report anything new."""
+def _told(base: int, where: Any) -> Any:
+    """Return whether a step effect has an event to tell."""
+    return np.any(carray(pointer(base + where[0]), (where[1],), np.float64) != 0.0)
+
+
+@njit
+def _look(orders: Any, looking: Any, words: Any, base: int, fields: Any) -> Any:
+    """Let step effects look at MuJoCo's sensors; return whether they have an event to tell."""
     copy_bytes(base + orders.sensors, fields[orders.sensors_word], orders.sensors_size)
     run(looking, words)
-    report = carray(pointer(base + orders.report[0]), (orders.report[1],), np.float64)
-    return number != orders.reported and np.any(report != 0.0)
+    return _told(base, orders.told_looking)
 
 
 @njit
@@ -195,7 +199,7 @@ def _fly(
         with_state(orders.get_state, model, data, base + orders.state_row, orders.state)
         if orders.looks_first:
             of_model_and_data(orders.step1, model, data)
-            if _look(orders, looking, words, base, fields, number):
+            if _look(orders, looking, words, base, fields):
                 stopped[0] = k
                 return
             _copy(base, base, after_looking)
@@ -203,6 +207,9 @@ def _fly(
             source = inputs[i, 1] + k * inputs[i, 2] + vehicle * inputs[i, 3]
             copy_bytes(base + inputs[i, 0], source, inputs[i, 4])
         run(sensing, words)
+        if _told(base, orders.told_sensing):
+            stopped[0] = k
+            return
         _copy(record, base, before)
         _copy(base, base, after_sensing)
         for step in range(orders.steps if flown else 1):
@@ -218,6 +225,9 @@ def _fly(
                     ever[i] = max(ever[i], saturated[i])
             if prepared:
                 run(preparing, words)
+                if _told(base, orders.told_preparing):
+                    stopped[0] = k
+                    return
                 _write(fields, base, written)
             function = orders.step if flown else orders.forward
             if len(masses):
@@ -231,7 +241,7 @@ def _fly(
                 copy_bytes(base + orders.sensors, fields[orders.sensors_word], orders.sensors_size)
                 _copy(record, base, after)
             elif orders.looks:
-                if _look(orders, looking, words, base, fields, number):
+                if _look(orders, looking, words, base, fields):
                     stopped[0] = k
                     return
                 _copy(base, base, after_looking)

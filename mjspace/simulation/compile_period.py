@@ -4,7 +4,8 @@ What it computes is then a list of calls of NumPy's loops on one memory, which a
 repeats without Python.
 """
 
-from collections.abc import Iterator, Sequence
+import copy
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,14 +16,14 @@ from mjspace.errors import FlightError, place_of
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.hidden_memory import refusing_hidden_memory
-from mjspace.simulation.period_program import PeriodProgram, Recorded, Section, Write
+from mjspace.simulation.period_program import PeriodProgram, Recorded, Section
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.traced_arrays import TracedArrays, changes, tuple_like
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.tracing.replay import prove
-from mjspace.vehicle.step_effect import StepEffect
+from mjspace.vehicle.step_effect import Instant, StepEffect, Write
 
 
 def compile_period(
@@ -45,7 +46,7 @@ def compile_period(
         with np.errstate(all="ignore"):
             tracing = _Tracing(assembly, layout, effects, example, reference)
             if not law:
-                return tracing.of_command(example.command)
+                return tracing.of_command(example)
             with refusing_hidden_memory(tracing.law) as tracing.law:
                 return tracing.with_law()
     except (FlightError, TypeError, ValueError) as error:
@@ -65,8 +66,12 @@ class _Tracing(TracedArrays):
         reference: DesiredMotion,
     ) -> None:
         super().__init__()
-        self.assembly, self.layout, self.effects = assembly, layout, effects
+        self.assembly, self.layout, self.effects = assembly, copy.copy(layout), effects
         self.time = self.held(example.time)
+        instant = np.array([example.time])
+        self.known = tuple(self.held(effect.known(instant)[0]) for effect in effects)
+        for effect, known in zip(effects, self.known, strict=True):
+            self.layout.surroundings = effect.around(self.layout.surroundings, self.traced(known))
         self.physics = self.held(example.physics[:1])
         self.sensordata = self.held(example.sensordata[:1])
         self.reference = tuple_like(reference, map(self.held, reference))
@@ -101,6 +106,7 @@ class _Tracing(TracedArrays):
             reports = self._reports(measurement)
             state, command, signals = self._law_step(measurement)
             state = self.following(self.law_state, state)
+            alarms = self._alarms(measurement, command, signals)
             command, signals = self.numbers(command), self.numbers(signals)
         prove(sensing[0], self.program.memory)
         changed = changes(self.law_state, state) + changes(before, after)
@@ -111,13 +117,13 @@ class _Tracing(TracedArrays):
         recorded += reports
         return self._compiled(
             command,
-            sensing=Section(sensing[0], changed),
+            sensing=Section(sensing[0], changed, alarms),
             recorded=recorded,
             kinds={"law": type(self.law_state), "signals": type(signals)},
         )
 
-    def of_command(self, command: Any) -> PeriodProgram:
-        """Return the program of the actuators under the law's ``command``.
+    def of_command(self, example: ControlPeriod) -> PeriodProgram:
+        """Return the program of the actuators under the law's command, as that of the ``example``.
 
         Raises:
             Untraceable: as ``compile_period``; or the law has an inner loop.
@@ -126,11 +132,16 @@ class _Tracing(TracedArrays):
             raise Untraceable("the law has an inner loop")
         if any(tick % self.assembly.scenario.rates.steps for tick in self.suite.ticks):
             raise Untraceable("sensors sample between control instants")
+        if self._alarms(example.measurement, example.command, example.signals).size:
+            raise Untraceable("a step effect waits for a signal")
         with self.program.section() as nothing:
             pass
-        held = (self.held_of_one(np.asarray(each, float)) for each in command)
+        held = (self.held_of_one(np.asarray(each, float)) for each in example.command)
         return self._compiled(
-            tuple_like(command, held), sensing=Section(nothing[0], []), recorded=[], kinds={}
+            tuple_like(example.command, held),
+            sensing=Section(nothing[0], [], np.zeros(0)),
+            recorded=[],
+            kinds={},
         )
 
     def _compiled(
@@ -147,12 +158,18 @@ class _Tracing(TracedArrays):
             memory, applied, saturated = self.assembly.actuators.act(
                 self.traced_arrays(self.memory), motors, truth, self.assembly.hold
             )
+            instant = Instant(
+                *(self.traced(self.time), self.traced(self.physics), truth, None, command, None),
+                *(self.traced_arrays(self.memory), []),
+            )
+            for effect in self.effects:
+                memory, applied = effect.change(memory, applied, instant)
             outputs = self.numbers(applied)
             (cut,) = self.numbers((saturated,))
             remembered = self.following(own, tuple(memory[name] for name in self.memory))
         prove(driving[0], self.program.memory)
-        preparing, masses = self._preparing(dict(zip(self.memory, remembered, strict=True)))
-        looking, report = self._looking()
+        remembers = dict(zip(self.memory, remembered, strict=True))
+        preparing, written, masses = self._preparing(remembers)
         before = [Recorded("physics", "", self.physics)]
         before += [Recorded("memory", name, array) for name, array in self.memory.items()]
         before += [*recorded, *_recorded("command", command)]
@@ -161,9 +178,9 @@ class _Tracing(TracedArrays):
         changed = changes(self.law_state, inner) + changes(own, remembered)
         return PeriodProgram(
             program=self.program,
-            looking=looking,
+            looking=self._looking(),
             sensing=sensing,
-            driving=Section(driving[0], changed),
+            driving=Section(driving[0], changed, np.zeros(0)),
             preparing=preparing,
             time=self.time,
             physics=self.physics,
@@ -174,19 +191,27 @@ class _Tracing(TracedArrays):
             sensors=self.sensors,
             biases=self.biases,
             draws=self.draws,
+            known=self.known,
             command=command,
             has_law="law" in kinds,
             applied=outputs,
             saturated=cut,
-            report=report,
+            written=written,
             masses=masses,
             before=before,
             after=after,
             kinds=kinds | {"command": type(command)},
         )
 
-    def _looking(self) -> tuple[Section, np.ndarray]:
-        """Return what step effects see, and their reports."""
+    def _alarms(self, measurement: Any, command: Any, signals: Any) -> np.ndarray:
+        """Return where step effects have an event to tell after the law's step."""
+        topics = {"truth": self._truth(), "measurement": measurement}
+        topics |= {"command": command, "law": signals}
+        memory, time = self.traced_arrays(self.memory), self.traced(self.time)
+        return self._report([effect.alarm(memory, time, topics) for effect in self.effects])
+
+    def _looking(self) -> Section:
+        """Return what step effects see."""
         own = tuple(self.memory.values())
         with self.program.section() as looking:
             memory, reports = self.traced_arrays(self.memory), []
@@ -195,24 +220,44 @@ class _Tracing(TracedArrays):
                     memory, report = effect.look(
                         memory, self.traced(self.physics), self.traced(self.sensordata)
                     )
-                    reports.append(report.astype(float)[:, 0])
+                    reports.append(report)
             seen = self.following(own, tuple(memory[name] for name in self.memory))
-            (report,) = self.numbers((np.concatenate(reports) if reports else np.zeros(0),))
+            told = self._report(reports)
         prove(looking[0], self.program.memory)
-        return Section(looking[0], changes(own, seen)), report
+        return Section(looking[0], changes(own, seen), told)
 
-    def _preparing(self, remembered: dict[str, np.ndarray]) -> tuple[Section, list[Write]]:
-        """Return what step effects change for a step, after which ``remembered`` holds."""
+    def _preparing(
+        self, remembered: dict[str, np.ndarray]
+    ) -> tuple[Section, list[Write], list[Write]]:
+        """Return what step effects change for a step, after which ``remembered`` holds.
+
+        That is a section, what it writes into mjData, and into mjModel.
+        """
         memory = self.traced_arrays(self.memory), self.traced_arrays(remembered)
         with self.program.section() as preparing:
-            found = [each for effect in self.effects for each in effect.masses(*memory)]
-            values = self.numbers(tuple(value for _, _, value in found))
+            written, masses, reports = list[Write](), list[Write](), []
+            for effect, known in zip(self.effects, self.known, strict=True):
+                writes, report = effect.prepare(
+                    self.traced(self.physics), self.traced(self.time), self.traced(known)
+                )
+                written += self._own_numbers(writes)
+                reports.append(report)
+                of_bodies = effect.masses(*memory)
+                masses += self._own_numbers(
+                    Write(name, body * values.size, values) for name, body, values in of_bodies
+                )
+            told = self._report(reports)
         prove(preparing[0], self.program.memory)
-        masses = [
-            Write(name, body * array.size, array)
-            for (name, body, _), array in zip(found, values, strict=True)
-        ]
-        return Section(preparing[0], []), masses
+        return Section(preparing[0], [], told), written, masses
+
+    def _own_numbers(self, writes: Iterable[Write]) -> list[Write]:
+        """Return the writes with arrays that nothing else changes."""
+        return [each._replace(values=self.numbers((each.values,))[0]) for each in writes]
+
+    def _report(self, reports: Iterable[Any]) -> np.ndarray:
+        """Return as one array where there is an event to tell."""
+        given = [report.astype(float).reshape(-1) for report in reports if report is not None]
+        return self.numbers((np.concatenate(given),))[0] if given else np.zeros(0)
 
     def _truth(self) -> Any:
         physics, memory = self.traced(self.physics), self.traced_arrays(self.memory)

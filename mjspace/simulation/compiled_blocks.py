@@ -2,13 +2,13 @@
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 from mujoco.batch import SimulationError
 
-from mjspace.contract import Array, DesiredMotion
+from mjspace.contract import TICK, Array, DesiredMotion
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compile_period import compile_period
@@ -20,6 +20,8 @@ from mjspace.simulation.recording import OF_THE_LAW, Columns, Recording
 from mjspace.simulation.stepper import Stepper
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.vehicle.step_effect import State
+
+_NEVER = 2**62
 
 
 class CompiledBlocks:
@@ -49,6 +51,7 @@ class CompiledBlocks:
             if effect.not_compiled
         )
         self.on = not self.reason
+        self._fields = sorted({name for effect in stepper.effects for name in effect.fields})
 
     def __str__(self) -> str:
         """Return what is compiled, in one line."""
@@ -78,22 +81,24 @@ class CompiledBlocks:
         be had, or differs from them or in the state that they lead to, they are returned, and
         Python flies on. ``stop`` is called in each period in which the law is called in Python.
         """
+        count = min(count, self._due(first.number + 1) - first.number)
+        if count < 2 or columns.events:  # compiled code has no events, and cannot be held to it
+            return columns, None
         after, trouble = self._after_a_period(), None
         second = after._replace(memory=self._stepper.observed(first.number + 1))
         try:
             flight = self._flight or self._compile(first, desired)
+            flight.follow({name: self._stepper.batch.expand(name) for name in self._fields})
             flight.set(first.physics, first.memory, first.sensors, first.law)
             flight.begin(first.number, count, last)
             if flight.has_law:
                 flight.fly(desired)
                 stopped = int(flight.stopped.min())
-                if stopped == 1:
-                    return columns, None
-                if stopped < count:  # Python flies the period in which something is told
+                if 2 <= stopped < count:  # Python flies the period in which something is told
                     flight.set(first.physics, first.memory, first.sensors, first.law)
                     flight.begin(first.number, stopped, last)
                     flight.fly(desired)
-                compiled = replace(flight.columns(), events=columns.events)
+                compiled = flight.columns()
             else:
                 compiled, trouble = self._fly_law_in_python(flight, first, count, desired, stop)
         except (Untraceable, SimulationError) as error:
@@ -101,6 +106,9 @@ class CompiledBlocks:
             return columns, None
         if flight.warned:
             self._off("MuJoCo warned", after)
+            return columns, None
+        if len(compiled) < 2:
+            self._go_back_to(after)
             return columns, None
         different = _difference(columns, compiled) or second.difference(compiled)
         if different:
@@ -134,6 +142,8 @@ class CompiledBlocks:
         trouble: FlightError | None = None
         recording = Recording(first, count, OF_THE_LAW)
         flight.fly_period(first.command)
+        if flight.stopped.min() == 0:
+            return flight.columns(), None
         recording.write(first)
         rows: Any = zip(*(array[1:count] for array in desired), strict=True)
         for number, row in enumerate(rows, first.number + 1):
@@ -159,6 +169,12 @@ class CompiledBlocks:
                 break
         of_law, columns = recording.columns(), flight.columns()
         return Columns(of_law.groups | columns.groups, of_law.events, of_law.kinds), trouble
+
+    def _due(self, number: int) -> int:
+        """Return the first period from that ``number`` on in which an event is sure to happen."""
+        control = self._assembly.scenario.rates.control
+        due = min((effect.due(number * control) for effect in self._stepper.effects), default=inf)
+        return int(min((due + TICK) / control, _NEVER))
 
     def _take(self, flight: CompiledFlight) -> None:
         """Put the stepper where the compiled flight is."""

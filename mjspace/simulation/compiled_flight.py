@@ -15,7 +15,7 @@ from mjspace.simulation.period_program import Copies, PeriodProgram, Recorded
 from mjspace.simulation.recording import Columns
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
-from mjspace.vehicle.step_effect import StepEffect
+from mjspace.vehicle.step_effect import StepEffect, Write
 
 _WORD = 8  # bytes
 
@@ -86,6 +86,10 @@ class CompiledFlight:
         for target, values in zip(self.law, law, strict=True):
             target[...] = values
 
+    def follow(self, fields: dict[str, Array]) -> None:
+        """Take over fields of MuJoCo's model that step effects may have changed, (N, ...)."""
+        self._batch.follow(fields)
+
     def remember(self, memory: dict[str, Array]) -> None:
         """Let actuators and step effects remember that."""
         for name, values in self.memory.items():
@@ -94,12 +98,14 @@ class CompiledFlight:
     def begin(self, first: int, count: int, last: int) -> None:
         """Begin a block of ``count`` periods from number ``first`` on.
 
-        The flight's ``last`` is not flown. What the first tells is ignored: Python tells it.
+        The flight's ``last`` is not flown.
         """
         self._first, self._flown = first, 0
         self._recorded = np.empty((count, len(self.physics), self._record_size), np.uint8)
         orders = self._orders
-        orders["last"], orders["reported"] = last, first
+        orders["last"] = last
+        times = (first + np.arange(count, dtype=float)) * self._assembly.scenario.rates.control
+        self._known = [effect.known(times)[:, None] for effect in self._effects]
         orders["period_stride"], orders["vehicle_stride"] = self._recorded.strides[:2]
 
     def fly(self, desired: DesiredMotion) -> None:
@@ -114,19 +120,7 @@ class CompiledFlight:
         # The same for every vehicle, and of each its own.
         rows = [np.ascontiguousarray(array[:count])[:, None] for array in desired]
         rows += self._suite.draws(range(self._first, self._first + count)).values()
-        targets = (*period.reference, *period.draws.values())
-        inputs = _table(
-            (
-                self._offset(to),
-                of.ctypes.data,
-                of.strides[0],
-                of.strides[1] if of.shape[1] > 1 else 0,
-                to.nbytes,
-            )
-            for to, of in zip(targets, rows, strict=True)
-        )
-        self._orders["inputs"] = inputs.ctypes.data, len(inputs)
-        self._fly(count)
+        self._fly(count, (*period.reference, *period.draws.values()), rows)
 
     def fly_period(self, command: Any) -> None:
         """Fly the next period of the block under the law's ``command``, as ``fly`` does.
@@ -136,12 +130,25 @@ class CompiledFlight:
         """
         for target, values in zip(self.command, command, strict=True):
             target[...] = values
-        self._fly(1)
+        self._fly(1, (), [])
 
-    def _fly(self, count: int) -> None:
-        orders, recorded = self._orders, self._recorded
-        orders["first"], orders["count"] = self._first + self._flown, count
-        orders["record"] = recorded.ctypes.data + self._flown * recorded.strides[0]
+    def _fly(self, count: int, targets: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> None:
+        """Fly the next ``count`` periods with ``rows``, one for each, put into the ``targets``."""
+        orders, recorded, begun = self._orders, self._recorded, self._flown
+        rows = [*rows, *(known[begun:] for known in self._known)]
+        inputs = _table(
+            (
+                self._offset(to),
+                of.ctypes.data,
+                of.strides[0],
+                of.strides[1] if of.shape[1] > 1 else 0,
+                to.nbytes,
+            )
+            for to, of in zip((*targets, *self._period.known), rows, strict=True)
+        )
+        orders["inputs"] = inputs.ctypes.data, len(inputs)
+        orders["first"], orders["count"] = self._first + begun, count
+        orders["record"] = recorded.ctypes.data + begun * recorded.strides[0]
         self.stopped[:] = count
         self._batch.apply(self._function, orders.ctypes.data)
         self._flown += int(self.stopped.min())
@@ -211,15 +218,8 @@ class CompiledFlight:
                 )
                 for driven, values in zip(drives, period.applied, strict=True)
             ),
-            "masses": _table(
-                (
-                    getattr(words_of_model, each.array),
-                    _WORD * each.first,
-                    self._offset(each.values),
-                    each.values.nbytes,
-                )
-                for each in period.masses
-            ),
+            "written": self._writes(period.written, words_of),
+            "masses": self._writes(period.masses, words_of_model),
             "before": self._record_table(period.before, self._record_places),
             "after": self._record_table(period.after, self._record_places[len(period.before) :]),
         }
@@ -243,7 +243,9 @@ class CompiledFlight:
         )
         orders["looks"] = any(effect.looks for effect in self._effects)
         orders["looks_first"] = orders["looks"] and period.has_law  # else Python has looked
-        orders["report"] = self._offset(period.report), period.report.size
+        for name in ("looking", "sensing", "preparing"):
+            told = getattr(period, name).report
+            orders[f"told_{name}"] = (self._offset(told), told.size) if told.size else (0, 0)
         orders["stopped"] = self.stopped.ctypes.data
         return orders
 
@@ -252,7 +254,7 @@ class CompiledFlight:
         period, tables = self._period, dict[str, np.ndarray]()
         words, relative, used = [], [], 0
         for name in ("looking", "sensing", "driving", "preparing"):
-            calls, after = getattr(period, name)
+            calls, after, _ = getattr(period, name)
             tables[name] = calls.table + np.array([0, 0, used, used, used])
             tables[f"after_{name}"] = self._copies(after)
             words.append(calls.words)
@@ -266,6 +268,18 @@ class CompiledFlight:
 
     def _copies(self, pairs: Copies) -> np.ndarray:
         return _table((self._offset(to), self._offset(of), to.nbytes) for to, of in pairs)
+
+    def _writes(self, writes: Sequence[Write], words: Any) -> np.ndarray:
+        """Return the table of ``writes`` into a struct whose fields stand at these ``words``."""
+        return _table(
+            (
+                getattr(words, each.array),
+                _WORD * each.first,
+                self._offset(each.values),
+                each.values.nbytes,
+            )
+            for each in writes
+        )
 
     def _record_table(self, recorded: Sequence[Recorded], places: Sequence[int]) -> np.ndarray:
         return _table(

@@ -100,12 +100,28 @@ class NativeBatch:
         self.state = self._array(rows, ctypes.c_double, (vehicles, size))
         counters = (vehicles, int(mujoco.mjtWarning.mjNWARNING), 2)
         self.warning = self._array(library().mjb_warning(self._batch), ctypes.c_int, counters)
-        for name, values in fields.items():
-            at = library().mjb_expand(self._batch, name.encode(), None, None)
-            self._array(at, ctypes.c_double, values.shape)[...] = values
         for name in own:
             library().mjb_expand(self._batch, name.encode(), None, None)
-        if fields or own:
+        if own:
+            self._check(library().mjb_setConst(self._batch, None, 0))
+        self._fields: dict[str, Array] = {}
+        self.follow(fields)
+
+    def follow(self, fields: Mapping[str, Array]) -> None:
+        """Let those fields of the model be the vehicles' own, (N, ...), with all that derives.
+
+        Raises:
+            mujoco.batch.SimulationError: MuJoCo raised an error.
+        """
+        changed = False
+        for name, values in fields.items():
+            if name not in self._fields:
+                at = library().mjb_expand(self._batch, name.encode(), None, None)
+                self._fields[name] = self._array(at, ctypes.c_double, values.shape)
+                changed = True
+            changed |= not np.array_equal(self._fields[name], values)
+            self._fields[name][...] = values
+        if changed:
             self._check(library().mjb_setConst(self._batch, None, 0))
 
     def apply(self, function: int, argument: int) -> None:

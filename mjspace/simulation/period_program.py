@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mjspace.tracing.program import Calls, Program
+from mjspace.vehicle.step_effect import Write
 
 Copies = list[tuple[np.ndarray, np.ndarray]]
 """Pairs (to, from) of arrays of a program's memory."""
@@ -25,16 +26,8 @@ class Section(NamedTuple):
     calls: Calls
     after: Copies
     """Made within the memory after it."""
-
-
-class Write(NamedTuple):
-    """Numbers that are written into one of MuJoCo's arrays."""
-
-    array: str
-    """Its name, in mjData or mjModel."""
-    first: int
-    """How many numbers stand before them."""
-    values: np.ndarray
+    report: np.ndarray
+    """Other than 0.0 where a step effect has an event to tell, (reports,)."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +61,8 @@ class PeriodProgram:
     """The constant bias of each sensor that is not ideal, (1, axes)."""
     draws: dict[str, np.ndarray]
     """Random numbers of a sample, (1, axes), as ``SensorSuite.draws`` names them."""
+    known: tuple[np.ndarray, ...]
+    """What each step effect knows of a control instant beforehand, (k,)."""
     command: Any
     """The law's command, a named tuple of arrays (1, ...)."""
     has_law: bool
@@ -76,8 +71,8 @@ class PeriodProgram:
     """What each kind of actuator applies, (1, width)."""
     saturated: np.ndarray
     """1.0 for each motor that saturates, (1, motors)."""
-    report: np.ndarray
-    """Other than 0.0 where a step effect has an event to tell, (reports,)."""
+    written: list[Write]
+    """By step effects, into mjData."""
     masses: list[Write]
     """Into mjModel."""
     before: list[Recorded]

@@ -1,6 +1,8 @@
 """Step effects: what acts on the vehicles in flight besides actuators and environment."""
 
+import math
 from abc import ABC
+from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -9,6 +11,10 @@ from mjspace.contract import Array, Event, Measurement
 
 State = dict[str, Array]
 """Named arrays that are remembered from step to step, vehicle axis first."""
+
+
+Topics = Mapping[str, Any]
+"""Named tuples of arrays by the topic that they are logged in."""
 
 
 class Instant(NamedTuple):
@@ -38,6 +44,17 @@ class Instant(NamedTuple):
         return self.command is not None
 
 
+class Write(NamedTuple):
+    """Numbers for one of MuJoCo's arrays."""
+
+    array: str
+    """Its name."""
+    first: int
+    """How many numbers of a vehicle's stand before them."""
+    values: Array
+    """(N, k)."""
+
+
 class StepEffect(ABC):
     """Base of an effect on a batch of vehicles: override what it does, the rest does nothing.
 
@@ -48,8 +65,9 @@ class StepEffect(ABC):
     In a control period the order is: ``observe``; the sensors and the law; ``at_control``; then for
     each integration step the actuators, ``change``, ``before_step``, MuJoCo, ``after_step``.
 
-    Where an effect is compiled, its methods of array code (``look``, ``add_to_truth``, ``change``,
-    ``masses``) are taken down and stand for the others in each period in which it reports nothing.
+    Where an effect is compiled, its methods of array code (``look``, ``add_to_truth``, ``alarm``,
+    ``change``, ``prepare``, ``masses``) are taken down. They stand for all that it does in each
+    period but those that are ``due`` and those in which they report an event: Python flies these.
     """
 
     name: ClassVar[str]
@@ -62,6 +80,8 @@ class StepEffect(ABC):
     """Why a flight with it is flown in Python; "" where it is compiled."""
     looks: ClassVar[bool] = False
     """Whether it has a ``look``, at each control instant and integration step."""
+    fields: ClassVar[tuple[str, ...]] = ()
+    """Of MuJoCo's model, those that it changes with an event."""
     wrench: Array | None = None
     """Force [N], inertial axes, and torque [N m], body axes, on the bus during the step that
     ``before_step`` has prepared, (N, 6). Those of all effects are added up, applied and logged in
@@ -114,10 +134,43 @@ class StepEffect(ABC):
         """
         return memory, np.zeros((len(physics), 1), bool)
 
-    def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
-        """Return each field of MuJoCo's model that it changes, its body and the values (N, ...).
+    def alarm(self, memory: State, time: Array, topics: Topics) -> Array | None:
+        """Return where there is an event to be told at a control instant, True or False (N, 1).
 
-        Of a compiled effect, for the step in which the actuators lead from ``before`` to ``after``.
+        Of a compiled effect, after the law's step. ``topics`` has the named tuples "truth",
+        "measurement", "command" and "law".
+        """
+        return None
+
+    def prepare(
+        self, physics: Array, time: Array, known: Array
+    ) -> tuple[list[Write], Array | None]:
+        """Return (what it writes into MuJoCo's data, report) for the step that begins at ``time``.
+
+        Of a compiled effect. The report is as that of ``look``, or None; ``known`` (k,) is of the
+        control instant before.
+        """
+        return [], None
+
+    def due(self, after: float) -> float:
+        """Return the first instant from ``after`` on at which it is sure to have an event [s].
+
+        Of a compiled effect; infinite where there is none.
+        """
+        return math.inf
+
+    def known(self, times: Array) -> Array:
+        """Return what is known beforehand of control instants at ``times`` (n,) [s], (n, k)."""
+        return np.zeros((len(times), 0))
+
+    def around(self, surroundings: Any, known: Array) -> Any:
+        """Return the ``sensors.base.Surroundings`` with what of them is ``known`` beforehand."""
+        return surroundings
+
+    def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
+        """Return masses and inertias for the step that leads from ``before`` to ``after``.
+
+        Of a compiled effect: the field of MuJoCo's model, its body, and the values (N, ...).
         """
         return []
 
