@@ -24,8 +24,10 @@ _NUMBER, _TABLE = np.int64, (np.int64, (2,))  # a table: its address, its rows
 ORDERS = np.dtype([
     # MuJoCo's functions, and the state that mj_getState gets
     ("step", _NUMBER), ("forward", _NUMBER), ("get_state", _NUMBER), ("state", _NUMBER),
-    # numbers of the block's first period, of its periods, and of the flight's last, not flown
-    ("first", _NUMBER), ("count", _NUMBER), ("last", _NUMBER),
+    # numbers of the block's first period and of the flight's last, which is not flown
+    ("first", _NUMBER), ("last", _NUMBER),
+    # halves to be flown: 2 k is the control instant of the block's period k, 2 k + 1 its steps
+    ("begin", _NUMBER), ("end", _NUMBER),
     # integration steps of a period; 1 where the actuators act in each of them
     ("steps", _NUMBER), ("stepwise", _NUMBER),
     # control period and integration step [s]
@@ -34,8 +36,9 @@ ORDERS = np.dtype([
     # of a control instant and of the actuators
     ("memory", *_TABLE), ("words", *_TABLE), ("relative", *_TABLE),
     ("sensing", *_TABLE), ("driving", *_TABLE),
-    # into the memory at a control instant: (to, address, strides of periods and vehicles, size)
-    ("inputs", *_TABLE),
+    # into the memory at a control instant, and before a period's steps: (to, address, strides of
+    # periods and vehicles, size)
+    ("inputs", *_TABLE), ("commands", *_TABLE),
     # what a vehicle remembers from block to block: (in the memory, in the vehicle's row, size)
     ("remembered", *_TABLE), ("row", _NUMBER), ("row_stride", _NUMBER),
     # within the memory, after either section: (to, from, size)
@@ -116,13 +119,22 @@ def _copy(target: int, source: int, table: Any) -> None:
 
 
 @njit
+def _copy_inputs(base: int, table: Any, period: int, vehicle: int) -> None:
+    """Copy a vehicle's numbers of a period of the block into the memory."""
+    for i in range(len(table)):
+        source = table[i, 1] + period * table[i, 2] + vehicle * table[i, 3]
+        copy_bytes(base + table[i, 0], source, table[i, 4])
+
+
+@njit
 def _fly(
     orders: Any, memory: Any, words: Any, model: int, data: int, fields: Any, vehicle: int
 ) -> None:
-    """Fly a block on a ``memory`` and the ``words`` placed there, which the caller keeps alive."""
+    """Fly a part of a block on a ``memory`` and the ``words`` placed there, which the caller keeps alive."""
     base = address_of(memory)
     sensing, driving = _table(orders.sensing, 5), _table(orders.driving, 5)
-    inputs, remembered = _table(orders.inputs, 5), _table(orders.remembered, 3)
+    inputs, commands = _table(orders.inputs, 5), _table(orders.commands, 5)
+    remembered = _table(orders.remembered, 3)
     after_sensing, after_driving = _table(orders.after_sensing, 3), _table(orders.after_driving, 3)
     before, after = _table(orders.before, 3), _table(orders.after, 3)
     applied = _table(orders.applied, 4)
@@ -131,20 +143,23 @@ def _fly(
     saturated = carray(pointer(base + orders.saturated[0]), (motors,), np.float64)
     row = orders.row + vehicle * orders.row_stride
     _copy(base, row, remembered)
-    for k in range(orders.count):
+    for half in range(orders.begin, orders.end):
+        k = half // 2
         number = orders.first + k
         flown = number < orders.last
         record = orders.record + k * orders.period_stride + vehicle * orders.vehicle_stride
         ever = carray(pointer(record + orders.saturated_record), (motors,), np.float64)
+        if half % 2 == 0 or half == orders.begin:
+            time[0] = number * orders.control
+            _get_state(orders.get_state, model, data, base + orders.state_row, orders.state)
+        if half % 2 == 0:
+            _copy_inputs(base, inputs, k, vehicle)
+            run(sensing, words)
+            _copy(record, base, before)
+            _copy(base, base, after_sensing)
+            continue
+        _copy_inputs(base, commands, k, vehicle)
         ever[:] = 0.0
-        time[0] = number * orders.control
-        _get_state(orders.get_state, model, data, base + orders.state_row, orders.state)
-        for i in range(len(inputs)):
-            source = inputs[i, 1] + k * inputs[i, 2] + vehicle * inputs[i, 3]
-            copy_bytes(base + inputs[i, 0], source, inputs[i, 4])
-        run(sensing, words)
-        _copy(record, base, before)
-        _copy(base, base, after_sensing)
         for step in range(orders.steps if flown else 1):
             acting = step == 0 or orders.stepwise != 0
             if acting:

@@ -32,19 +32,20 @@ def compile_period(
     reference: DesiredMotion,
     *,
     law: bool,
+    sensors: bool = True,
 ) -> PeriodProgram:
     """Return the program of a period like the ``example``, at which ``reference`` is desired.
 
-    Without ``law`` it begins with the law's command.
+    Without the ``law``, which is then called between sensors and actuators; or without both.
 
     Raises:
-        Untraceable: the law or an actuator does what cannot be taken down, and where.
+        Untraceable: the law or another part does what cannot be taken down, and where.
     """
     try:
         with np.errstate(all="ignore"):
             tracing = _Tracing(assembly, layout, example, reference)
             if not law:
-                return tracing.of_command(example.command)
+                return tracing.of_command(example.command, sensors=sensors)
             with refusing_hidden_memory(tracing.law) as tracing.law:
                 return tracing.with_law()
     except (FlightError, TypeError, ValueError) as error:
@@ -89,17 +90,11 @@ class _Tracing:
         Raises:
             Untraceable: as ``compile_period``; or sensors sample at times of their own.
         """
-        steps = self.assembly.scenario.rates.steps
-        if self.suite.ticks - {steps}:
-            raise Untraceable("sensors sample at other times than the control instants")
         before = tuple(self.sensors.values())
         with self.program.section() as sensing:
-            # Not of sample 0, which integrating sensors begin with.
-            sampled, measurement = self.suite.sample(
-                self._traced_arrays(self.sensors), steps, self._truth()
-            )
-            after = self._next(before, tuple(sampled[name] for name in self.sensors))
-            reports = self._reports(measurement)
+            after, measurement = self._sample()
+            # Of ideal sensors a block computes it for all of its periods at once.
+            reports = self._reports(measurement) if self.suite.ticks else []
             state, command, signals = self._law_step(measurement)
             state = self._next(self.law_state, state)
             command, signals = self._numbers(command), self._numbers(signals)
@@ -108,18 +103,16 @@ class _Tracing:
         for target, source in changes:
             target[...] = source
         recorded = [*_recorded("law", self.law_state), *_recorded("signals", signals)]
-        recorded += [Recorded("sensors", name, array) for name, array in self.sensors.items()]
-        recorded += reports
         return self._compiled(
             command,
             sensing=sensing[0],
             after_sensing=changes,
-            recorded=recorded,
+            recorded=[*recorded, *_recorded("command", command), *reports],
             kinds={"law": type(self.law_state), "signals": type(signals)},
         )
 
-    def of_command(self, command: Any) -> PeriodProgram:
-        """Return the program of the actuators under the law's ``command``.
+    def of_command(self, command: Any, *, sensors: bool) -> PeriodProgram:
+        """Return the program of the actuators under the law's ``command``, and of the ``sensors``.
 
         Raises:
             Untraceable: as ``compile_period``; or the law has an inner loop.
@@ -128,14 +121,19 @@ class _Tracing:
             raise Untraceable("the law has an inner loop")
         if any(tick % self.assembly.scenario.rates.steps for tick in self.suite.ticks):
             raise Untraceable("sensors sample between control instants")
-        with self.program.section() as nothing:
-            pass
+        before = after = tuple(self.sensors.values())
+        reports = []
+        with self.program.section() as sensing:
+            if sensors:
+                after, measurement = self._sample()
+                reports = self._reports(measurement)
+        prove(sensing[0], self.program.memory)
         held = (self._held(np.asarray(each, float)) for each in command)
         return self._compiled(
             _tuple_like(command, held),
-            sensing=nothing[0],
-            after_sensing=[],
-            recorded=[],
+            sensing=sensing[0],
+            after_sensing=_changes(before, after),
+            recorded=reports,
             kinds={},
         )
 
@@ -148,7 +146,10 @@ class _Tracing:
         recorded: list[Recorded],
         kinds: dict[str, type],
     ) -> PeriodProgram:
-        """Return the program that goes on with the actuators; ``recorded`` is of the law."""
+        """Return the program that goes on with the actuators.
+
+        ``recorded`` is of sensors and law.
+        """
         own = tuple(self.memory.values())
         with self.program.section() as driving:
             truth, motors, inner = self._truth(), self._traced_tuple(command), self.law_state
@@ -165,7 +166,7 @@ class _Tracing:
         prove(driving[0], self.program.memory)
         before = [Recorded("physics", "", self.physics)]
         before += [Recorded("memory", name, array) for name, array in self.memory.items()]
-        before += [*recorded, *_recorded("command", command)]
+        before += recorded
         after = [Recorded("sensordata", "", self.sensordata)]
         after += [Recorded("applied", str(index), array) for index, array in enumerate(outputs)]
         return PeriodProgram(
@@ -198,17 +199,25 @@ class _Tracing:
             physics, self._traced_arrays(self.memory), self.layout, self.assembly.actuators, ()
         )
 
-    def _reports(self, measurement: Any) -> list[Recorded]:
-        """Return what is recorded of the ``measurement``; nothing where it follows from the truth.
+    def _sample(self) -> tuple[Any, Any]:
+        """Return what the sensors remember after a sample, and the measurement."""
+        steps = self.assembly.scenario.rates.steps
+        if self.suite.ticks - {steps}:
+            raise Untraceable("sensors sample at other times than the control instants")
+        # Not of sample 0, which integrating sensors begin with.
+        sampled, measurement = self.suite.sample(
+            self._traced_arrays(self.sensors), steps, self._truth()
+        )
+        before = tuple(self.sensors.values())
+        return self._next(before, tuple(sampled[name] for name in self.sensors)), measurement
 
-        Of ideal sensors a block computes it for all of its periods at once.
-        """
-        if not self.suite.ticks:
-            return []
+    def _reports(self, measurement: Any) -> list[Recorded]:
+        """Return what is recorded of sensors: what they remembered, and the ``measurement``."""
         values = {name: value for name, value in measurement._asdict().items() if value.size}
         arrays = self._numbers(tuple(values.values()))
         return [
-            Recorded("measurement", name, array) for name, array in zip(values, arrays, strict=True)
+            *(Recorded("sensors", name, array) for name, array in self.sensors.items()),
+            *(Recorded("measurement", n, a) for n, a in zip(values, arrays, strict=True)),
         ]
 
     def _law_step(self, measurement: Any) -> tuple[Any, Any, Any]:

@@ -1,13 +1,14 @@
 """Compiled blocks of a flight, each proved by its first period, which Python flies as well."""
 
+import itertools
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from mujoco.batch import SimulationError
 
-from mjspace.contract import Array, DesiredMotion
+from mjspace.contract import Array, DesiredMotion, Measurement
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compile_period import compile_period
@@ -15,7 +16,8 @@ from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import Start
-from mjspace.simulation.recording import OF_THE_LAW, Columns, Recording
+from mjspace.simulation.law_calls import LawCalls
+from mjspace.simulation.recording import OF_SENSORS, Columns, Recording
 from mjspace.simulation.stepper import Stepper
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.vehicle.step_effect import State
@@ -50,9 +52,11 @@ class CompiledBlocks:
         """Return what is compiled, in one line."""
         if not self.on:
             return f"flown in Python: {self.reason}"
-        if self.reason:
-            return f"actuators compiled; sensors and law called in Python: {self.reason}"
-        return "compiled: sensors, law and actuators"
+        if not self.reason:
+            return "compiled: sensors, law and actuators"
+        if self._flight is not None and self._flight.has_sensors:
+            return f"sensors and actuators compiled; law called in Python: {self.reason}"
+        return f"actuators compiled; sensors and law called in Python: {self.reason}"
 
     def fly(
         self,
@@ -73,12 +77,12 @@ class CompiledBlocks:
         try:
             flight = self._flight or self._compile(first, desired)
             flight.set(first.physics, first.memory, first.sensors, first.law)
-            flight.begin(first.number, count, last)
             if flight.has_law:
-                flight.fly(desired)
+                flight.begin(first.number, count, last, desired, ())
+                flight.fly_periods(count)
                 compiled = flight.columns()
             else:
-                compiled, trouble = self._fly_law_in_python(flight, first, count, desired, stop)
+                compiled, trouble = self._call_law(flight, first, count, last, desired, stop)
         except (Untraceable, SimulationError) as error:
             self._off(str(error), after)  # MuJoCo raises the same in Python, which reports it
             return columns, None
@@ -97,50 +101,71 @@ class CompiledBlocks:
             return columns, None
         self._take(flight)
         if flight.has_law:
-            self._stepper.sensors = _copied(flight.sensors)
             kind: Any = type(flight.law)
             self._law.state = kind(*(values.copy() for values in flight.law)) if flight.law else ()
         return compiled, trouble
 
-    def _fly_law_in_python(
+    def _call_law(
         self,
         flight: CompiledFlight,
         first: ControlPeriod,
         count: int,
+        last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
     ) -> tuple[Columns, FlightError | None]:
-        """Fly the block with the law, and the sensors, called in each period.
+        """Fly the block with the law called in each period, and the sensors if not compiled.
 
         Return its columns, and what the law raised after them.
         """
-        trouble: FlightError | None = None
-        recording = Recording(first, count, OF_THE_LAW)
-        flight.fly_period(first.command)
-        recording.write(first)
+        calls = LawCalls(self._law, first, count, self._stepper.check)
+        flight.begin(first.number, count, last, desired, calls.commands)
+        flight.fly_to_instant(0)
+        sensing = None if flight.has_sensors else Recording(first, count, OF_SENSORS)
+        measured: Iterator[Sequence[Measurement]]
+        if sensing is None:
+            measured = calls.measurements(flight.measured())
+        else:
+            measured = self._sensed(flight, first, calls, sensing)
+        control = self._assembly.scenario.rates.control
         rows: Any = zip(*(array[1:count] for array in desired), strict=True)
-        for number, row in enumerate(rows, first.number + 1):
+        flown, trouble = 1, None
+        with np.errstate(all="ignore"):
+            for k, row in enumerate(rows, 1):
+                flight.fly_to_instant(k)
+                time = (first.number + k) * control
+                try:
+                    calls.step(k, time, next(measured), type(desired)(*row))
+                except FlightError as error:
+                    trouble = stopped_at(time, error)
+                    break
+                flown = k + 1
+                if stop():
+                    break
+        flight.fly_periods(flown)
+        self._law.state = calls.state_before(flown)
+        groups = flight.columns().groups | calls.groups(flown)
+        if sensing is not None:
+            groups |= sensing.columns(flown).groups
+        return Columns(groups, [], calls.kinds), trouble
+
+    def _sensed(
+        self, flight: CompiledFlight, first: ControlPeriod, calls: LawCalls, recording: Recording
+    ) -> Iterator[Sequence[Measurement]]:
+        """Yield what each call of the law measures in each period, of sensors called in Python."""
+        recording.write(first)
+        for number in itertools.count(first.number + 1):
             self._take(flight)
             period = self._stepper.sense(number)
-            try:
-                period.law, period.command, period.signals = self._law.step(
-                    period.time, period.measurement, type(desired)(*row)
-                )
-                self._stepper.check(period.command)
-            except FlightError as error:
-                trouble = stopped_at(period.time, error)
-                break
-            flight.fly_period(period.command)
             recording.write(period)
-            if stop():
-                break
-        of_law, columns = recording.columns(), flight.columns()
-        return Columns(of_law.groups | columns.groups, [], of_law.kinds), trouble
+            yield calls.of_each(period.measurement)
 
     def _take(self, flight: CompiledFlight) -> None:
         """Put the stepper where the compiled flight is."""
         self._stepper.batch.state[...] = flight.physics
         self._stepper.memory = _copied(flight.memory)
+        if flight.has_sensors:
+            self._stepper.sensors = _copied(flight.sensors)
 
     def _compile(self, example: ControlPeriod, desired: DesiredMotion) -> CompiledFlight:
         """Return the compiled flight, of the law too if that can be.
@@ -150,14 +175,16 @@ class CompiledBlocks:
         """
         arguments = self._assembly, self._stepper.layout, example
         reference = type(desired)(*(each[0] for each in desired))
-        try:
-            period = compile_period(*arguments, reference, law=True)
-        except Untraceable as error:
-            self.reason = str(error)
+        reasons = []
+        for law, sensors in ((True, True), (False, True), (False, False)):
             try:
-                period = compile_period(*arguments, reference, law=False)
-            except Untraceable as another:
-                raise Untraceable(f"{error}, and {another}") from another
+                period = compile_period(*arguments, reference, law=law, sensors=sensors)
+                break
+            except Untraceable as error:
+                reasons.append(str(error))
+        else:
+            raise Untraceable(", and ".join(dict.fromkeys(reasons)))
+        self.reason = ", and ".join(dict.fromkeys(reasons))
         self._flight = CompiledFlight(
             self._assembly,
             self._stepper.layout,

@@ -1,6 +1,7 @@
 """Blocks of control periods flown by compiled code, every vehicle on a thread of MuJoCo's batch."""
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,6 @@ class CompiledFlight:
         memory: what the actuators remember, by name, (N, ...).
         sensors: what the sensors remember, likewise.
         law: the law's state, a named tuple of arrays (N, ...), or empty.
-        command: the law's command, arrays (N, ...), where the period begins with it.
     """
 
     def __init__(
@@ -45,9 +45,8 @@ class CompiledFlight:
         self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model)
         self._suite = assembly.sensors(members)
         self.physics = self._batch.state
-        made = () if period.has_law else period.command
         named = (period.memory, period.sensors, period.biases)
-        remembered = [*(a for arrays in named for a in arrays.values()), *period.law, *made]
+        remembered = [*(a for arrays in named for a in arrays.values()), *period.law]
         places, size = _packed(remembered)
         self._rows = np.zeros((vehicles, size), np.uint8)
         views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
@@ -55,17 +54,18 @@ class CompiledFlight:
         self.memory, self.sensors, biases = (
             {name: next(one_by_one) for name in arrays} for arrays in named
         )
-        views = list(one_by_one)
         for name, bias in self._suite.biases.items():
             biases[name][...] = bias
-        self.law = type(period.law)(*views[: len(period.law)]) if period.law else ()
-        self.command = views[len(period.law) :]
+        self.law = type(period.law)(*one_by_one) if period.law else ()
         self._record_places, self._record_size = _packed(
             [*(each.array for each in (*period.before, *period.after)), period.saturated]
         )
         self._tables: list[np.ndarray] = []
         self._orders = self._constant_orders(remembered, places)
-        self._function = block_function().address
+        self._halves = _halves_of(self._orders)
+        self._apply = partial(
+            self._batch.apply, block_function().address, self._orders.ctypes.data
+        )
 
     def set(
         self, physics: Array, memory: dict[str, Array], sensors: dict[str, Array], law: Any
@@ -78,59 +78,55 @@ class CompiledFlight:
         for target, values in zip(self.law, law, strict=True):
             target[...] = values
 
-    def begin(self, first: int, count: int, last: int) -> None:
+    def begin(
+        self, first: int, count: int, last: int, desired: DesiredMotion, commands: Sequence[Array]
+    ) -> None:
         """Begin a block of ``count`` periods from number ``first`` on.
 
-        The flight's ``last`` is not flown.
+        ``desired`` has at least a row for each of them. ``commands`` are the arrays of the law's
+        commands, (count, N, ...), where the law is not compiled: those of a period are read when
+        its steps are flown. The flight's ``last`` period has none.
         """
-        self._first, self._flown = first, 0
+        self._flown = 0  # halves of periods
         self._recorded = np.empty((count, len(self.physics), self._record_size), np.uint8)
-        orders = self._orders
-        orders["last"] = last
+        self._recorded.setflags(write=False)  # but by the compiled function
+        period, orders = self._period, self._orders
+        orders["first"], orders["last"] = first, last
+        orders["record"] = self._recorded.ctypes.data
         orders["period_stride"], orders["vehicle_stride"] = self._recorded.strides[:2]
+        draws = self._suite.draws(range(first, first + count))
+        # The same for every vehicle, and of each its own.
+        rows = [np.ascontiguousarray(array[:count])[:, None] for array in desired]
+        inputs = (*period.reference, *period.draws.values()), (*rows, *draws.values())
+        given: Any = () if period.has_law else period.command, commands
+        self._of_block: tuple[Any, ...] = rows, draws, commands  # kept alive: they are read by their addresses
+        for name, (targets, sources) in (("inputs", inputs), ("commands", given)):
+            table = _table(map(self._input, targets, sources))
+            self._of_block += (table,)
+            orders[name] = table.ctypes.data, len(table)
 
-    def fly(self, desired: DesiredMotion) -> None:
-        """Fly the whole block with its law; ``desired`` has at least a row for each period.
+    def fly_to_instant(self, period: int) -> None:
+        """Fly on to the control instant of that ``period`` of the block, sensors included.
 
         A warning of MuJoCo's is left to be found in ``warned``.
 
         Raises:
             mujoco.batch.SimulationError: MuJoCo raised an error.
         """
-        period, count = self._period, len(self._recorded)
-        # The same for every vehicle, and of each its own.
-        rows = [np.ascontiguousarray(array[:count])[:, None] for array in desired]
-        rows += self._suite.draws(range(self._first, self._first + count)).values()
-        targets = (*period.reference, *period.draws.values())
-        inputs = _table(
-            (
-                self._offset(to),
-                of.ctypes.data,
-                of.strides[0],
-                of.strides[1] if of.shape[1] > 1 else 0,
-                to.nbytes,
-            )
-            for to, of in zip(targets, rows, strict=True)
-        )
-        self._orders["inputs"] = inputs.ctypes.data, len(inputs)
-        self._fly(count)
+        self._fly_halves(2 * period + 1)
 
-    def fly_period(self, command: Any) -> None:
-        """Fly the next period of the block under the law's ``command``.
+    def fly_periods(self, count: int) -> None:
+        """Fly on until so many periods of the block have been flown; as ``fly_to_instant``.
 
         Raises:
-            mujoco.batch.SimulationError: as ``fly``.
+            mujoco.batch.SimulationError: as ``fly_to_instant``.
         """
-        for target, values in zip(self.command, command, strict=True):
-            target[...] = values
-        self._fly(1)
+        self._fly_halves(2 * count)
 
-    def _fly(self, count: int) -> None:
-        orders, recorded = self._orders, self._recorded
-        orders["first"], orders["count"] = self._first + self._flown, count
-        orders["record"] = recorded.ctypes.data + self._flown * recorded.strides[0]
-        self._batch.apply(self._function, orders.ctypes.data)
-        self._flown += count
+    def _fly_halves(self, end: int) -> None:
+        self._halves[0], self._halves[1] = self._flown, end
+        self._apply()
+        self._flown = end
 
     @property
     def has_law(self) -> bool:
@@ -138,13 +134,30 @@ class CompiledFlight:
         return self._period.has_law
 
     @property
+    def has_sensors(self) -> bool:
+        """Whether the sensors are compiled."""
+        return self.has_law or any(each.group == "measurement" for each in self._period.before)
+
+    @property
     def warned(self) -> bool:
         """Whether MuJoCo has warned of anything."""
         return bool(self._batch.warning[:, :, 1].any())
 
+    def measured(self) -> dict[str, Array]:
+        """Return what sensors report in the block, (count, N, ...), where that is recorded.
+
+        A period's row is filled in at its control instant.
+        """
+        before = zip(self._record_places, self._period.before, strict=False)
+        return {
+            each.name: _view(self._recorded, place, each.array)
+            for place, each in before
+            if each.group == "measurement"
+        }
+
     def columns(self) -> Columns:
         """Return what the block has recorded so far, as views; without the law, if it has none."""
-        period, records = self._period, self._recorded[: self._flown]
+        period, records = self._period, self._recorded[: self._flown // 2]
         names = ("memory", "command", "applied", "wrench")
         groups: dict[str, dict[str, Array]] = {name: {} for name in names}
         recorded = (*period.before, *period.after, Recorded("saturated", "", period.saturated))
@@ -216,6 +229,11 @@ class CompiledFlight:
         orders["sensors_size"] = period.sensordata.nbytes
         return orders
 
+    def _input(self, to: np.ndarray, of: np.ndarray) -> tuple[int, ...]:
+        """Return the row of an input of each period ``to`` the memory; (count, N or 1, ...)."""
+        of_vehicles = of.strides[1] if of.shape[1] > 1 else 0
+        return self._offset(to), of.ctypes.data, of.strides[0], of_vehicles, to.nbytes
+
     def _offset(self, array: np.ndarray) -> int:
         return self._period.program.offset(array)
 
@@ -242,6 +260,12 @@ def _view(rows: np.ndarray, place: int, array: np.ndarray) -> Any:
     """Return the values like one vehicle's ``array`` (1, ...) at that place in the ``rows``."""
     part = rows[..., place : place + array.nbytes]
     return part.view(array.dtype).reshape(*rows.shape[:-1], *array.shape[1:])
+
+
+def _halves_of(orders: np.ndarray) -> np.ndarray:
+    """Return what begins with ``begin`` and ``end`` of the orders: a view that is quick to set."""
+    place = ORDERS.fields["begin"][1] // _WORD
+    return orders.reshape(1).view(np.int64)[place : place + 2]
 
 
 def _table(rows: Iterable[tuple[int, ...]]) -> np.ndarray:

@@ -69,10 +69,11 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
     return replace(block, time=block.time[:first], rows=rows, events=events), problem
 
 
-OF_THE_LAW = ("sensors", "measurement", "law", "signals")
-"""What sensors and law leave in a ``ControlPeriod``."""
+OF_SENSORS = ("sensors", "measurement")
+"""What sensors leave in a ``ControlPeriod``."""
 EVERYTHING = (
-    *OF_THE_LAW,
+    *OF_SENSORS,
+    *("law", "signals"),
     *("physics", "memory", "command", "applied", "saturated", "wrench", "sensordata"),
 )
 _AS_FLOATS = ("law", "command", "signals")
@@ -142,10 +143,11 @@ class Recording:
         self._events += period.events
         self._rows += 1
 
-    def columns(self) -> Columns:
-        """Return what has been recorded, as views."""
+    def columns(self, count: int | None = None) -> Columns:
+        """Return what has been recorded, of the first ``count`` periods or of all, as views."""
+        rows = self._rows if count is None else count
         groups = {
-            name: {label: column[: self._rows] for label, column in columns.items()}
+            name: {label: column[:rows] for label, column in columns.items()}
             for name, columns in self._columns.items()
         }
         return Columns(groups, self._events, self._kinds)
