@@ -171,8 +171,13 @@ class FaultSet:
         times = (time for fault in self._tables for time in (fault.at, fault.until))
         return min((t for t in times if t is not None and t >= after - TICK), default=np.inf)
 
-    def alarm(self, state: State, measured: Mapping[str, Any]) -> Array | None:
-        """Return where one begins by a signal, (N, faults of that kind); None without such.
+    @property
+    def waiting(self) -> bool:
+        """Whether one begins by a signal."""
+        return any(fault.when is not None for fault in self._tables)
+
+    def alarm(self, state: State, measured: Mapping[str, Any]) -> Array:
+        """Return where one begins by a signal, True or False, (N, faults that do).
 
         Array code; ``measured`` is that of ``decide``.
         """
@@ -181,7 +186,7 @@ class FaultSet:
             if fault.when is not None:
                 waits = phase[:, number] == _WAITING
                 begins.append((waits & self._is_due(number, 0.0, measured))[:, None])
-        return np.concatenate(begins, axis=-1) if begins else None
+        return np.concatenate(begins, axis=-1)
 
     def change(
         self, state: State, applied: tuple[Array, ...], now: float

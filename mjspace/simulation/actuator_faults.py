@@ -24,6 +24,7 @@ class ActuatorFaults(StepEffect):
         """Keep the ``faults``; ``between``: one begins or ends between control instants."""
         self._faults, self._between = faults, between
         # Its random numbers are drawn in each step.
+        self.waits = faults.waiting
         self.not_compiled = "a noisy motor is called in Python" if faults.noisy else ""
 
     def reset(self, physics: Array) -> State:
@@ -51,7 +52,7 @@ class ActuatorFaults(StepEffect):
             instant.events.extend(events)
         return self._faults.change(memory, applied, instant.time)
 
-    def alarm(self, memory: State, time: Array, topics: Topics) -> Array | None:
+    def alarm(self, memory: State, topics: Topics) -> Array:
         """Return where a fault begins by a signal."""
         return self._faults.alarm(memory, topics)
 

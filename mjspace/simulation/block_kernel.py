@@ -25,8 +25,10 @@ ORDERS = np.dtype([
     # MuJoCo's functions, and the state that mj_getState and mj_setState mean
     ("step", _NUMBER), ("step1", _NUMBER), ("forward", _NUMBER), ("set_const", _NUMBER),
     ("get_state", _NUMBER), ("set_state", _NUMBER), ("state", _NUMBER),
-    # numbers of the block's first period, of its periods, and of the flight's last, not flown
-    ("first", _NUMBER), ("count", _NUMBER), ("last", _NUMBER),
+    # numbers of the block's first period and of the flight's last, which is not flown
+    ("first", _NUMBER), ("last", _NUMBER),
+    # halves to be flown: 2 k is the control instant of the block's period k, 2 k + 1 its steps
+    ("begin", _NUMBER), ("end", _NUMBER),
     # integration steps of a period; 1 where in each of them actuators act, or step effects
     ("steps", _NUMBER), ("driven", _NUMBER), ("prepared", _NUMBER),
     # control period and integration step [s]
@@ -37,8 +39,9 @@ ORDERS = np.dtype([
     ("looking", *_TABLE), ("sensing", *_TABLE), ("driving", *_TABLE), ("preparing", *_TABLE),
     ("after_looking", *_TABLE), ("after_sensing", *_TABLE), ("after_driving", *_TABLE),
     ("after_preparing", *_TABLE),
-    # into the memory at a control instant: (to, address, strides of periods and vehicles, size)
-    ("inputs", *_TABLE),
+    # into the memory at a control instant, and before a period's steps: (to, address, strides of
+    # periods and vehicles, size)
+    ("inputs", *_TABLE), ("commands", *_TABLE),
     # what a vehicle remembers from block to block: (in the memory, in the vehicle's row, size)
     ("remembered", *_TABLE), ("row", _NUMBER), ("row_stride", _NUMBER),
     # into MuJoCo's arrays, of actuators and of step effects: (word of mjData that points there,
@@ -56,10 +59,10 @@ ORDERS = np.dtype([
     ("saturated_record", _NUMBER),
     # MuJoCo's sensors: in the memory, word of mjData, size
     ("sensors", _NUMBER), ("sensors_word", _NUMBER), ("sensors_size", _NUMBER),
-    # 1 where step effects look at what touches, also at control instants; what they report in a
-    # section, in the memory; where the period of the first report is noted of each vehicle
-    ("looks", _NUMBER), ("looks_first", _NUMBER), ("told_looking", *_TABLE),
-    ("told_sensing", *_TABLE), ("told_preparing", *_TABLE), ("stopped", _NUMBER),
+    # 1 where step effects look at what touches; what they report in a section, in the memory; where
+    # the period of the first report is noted of each vehicle
+    ("looks", _NUMBER), ("told_looking", *_TABLE), ("told_sensing", *_TABLE),
+    ("told_preparing", *_TABLE), ("stopped", _NUMBER),
 ])  # fmt: skip
 """What is flown; places in a memory are offsets [bytes], sizes are in bytes."""
 _ORDERS = from_dtype(ORDERS)
@@ -82,6 +85,14 @@ def _copy(target: int, source: int, table: Any) -> None:
     """Copy what the rows (to, from, size) of the ``table`` say."""
     for i in range(len(table)):
         copy_bytes(target + table[i, 0], source + table[i, 1], table[i, 2])
+
+
+@njit
+def _copy_inputs(base: int, table: Any, period: int, vehicle: int) -> None:
+    """Copy a vehicle's numbers of a period of the block into the memory."""
+    for i in range(len(table)):
+        source = table[i, 1] + period * table[i, 2] + vehicle * table[i, 3]
+        copy_bytes(base + table[i, 0], source, table[i, 4])
 
 
 @njit
@@ -126,24 +137,35 @@ def _derive(orders: Any, model: int, data: int, base: int, fields: Any) -> None:
 
 @njit
 def _step_burning(
-    orders: Any, function: int, model: int, data: int, base: int, fields: Any, derived: Any
+    orders: Any,
+    function: int,
+    model: int,
+    data: int,
+    base: int,
+    of_model: Any,
+    fields: Any,
+    derived: Any,
 ) -> None:
-    """Make a step of a vehicle whose masses have been written.
+    """Make a step with the masses of the moment.
 
     Of what ``mj_setConst`` derives from masses, a step reads the subtrees' masses, and where a
     constraint is in force the rest as well: as it takes 0.6 of a step's time, that is derived for
-    such steps alone. ``derived`` is (whether it is up to date, whether the last step needed it).
+    such steps alone. ``derived`` is whether the masses have been written in this call, whether all
+    is derived from them, and whether the last step needed it.
     """
+    if not derived[0] or _differs(of_model, base, _table(orders.masses, 4)):
+        _write_masses(orders, of_model, base)
+        derived[0], derived[1] = True, False
     most = carray(pointer(data + orders.most_constraints), (1,), np.int32)
-    if derived[1] and not derived[0]:
+    if derived[2] and not derived[1]:
         _derive(orders, model, data, base, fields)
-        derived[0] = True
+        derived[1] = True
     most[0] = 0
     of_model_and_data(function, model, data)
-    derived[1] = most[0] > 0
-    if derived[1] and not derived[0]:
+    derived[2] = most[0] > 0
+    if derived[2] and not derived[1]:
         _derive(orders, model, data, base, fields)
-        derived[0] = True
+        derived[1] = True
         of_model_and_data(function, model, data)
 
 
@@ -154,11 +176,85 @@ def _told(base: int, where: Any) -> Any:
 
 
 @njit
-def _look(orders: Any, looking: Any, words: Any, base: int, fields: Any) -> Any:
+def _look(orders: Any, words: Any, base: int, fields: Any) -> Any:
     """Let step effects look at MuJoCo's sensors; return whether they have an event to tell."""
     copy_bytes(base + orders.sensors, fields[orders.sensors_word], orders.sensors_size)
-    run(looking, words)
-    return _told(base, orders.told_looking)
+    run(_table(orders.looking, 5), words)
+    if _told(base, orders.told_looking):
+        return True
+    _copy(base, base, _table(orders.after_looking, 3))
+    return False
+
+
+@njit
+def _begin_period(
+    orders: Any, base: int, words: Any, model: int, data: int, fields: Any, record: int
+) -> Any:
+    """Fly a control instant, whose inputs are in the memory; return whether there is an event."""
+    if orders.looks:
+        of_model_and_data(orders.step1, model, data)
+        if _look(orders, words, base, fields):
+            return True
+    run(_table(orders.sensing, 5), words)
+    if _told(base, orders.told_sensing):
+        return True
+    _copy(record, base, _table(orders.before, 3))
+    _copy(base, base, _table(orders.after_sensing, 3))
+    return False
+
+
+@njit
+def _fly_steps(
+    orders: Any,
+    base: int,
+    words: Any,
+    model: int,
+    data: int,
+    of_model: Any,
+    fields: Any,
+    record: int,
+    number: int,
+    derived: Any,
+) -> Any:
+    """Fly the integration steps of that period; return whether there is an event in one."""
+    driving, preparing = _table(orders.driving, 5), _table(orders.preparing, 5)
+    applied, written = _table(orders.applied, 4), _table(orders.written, 4)
+    masses, after_driving = _table(orders.masses, 4), _table(orders.after_driving, 3)
+    time = carray(pointer(base + orders.time), (1,), np.float64)
+    motors = orders.saturated[1]
+    saturated = carray(pointer(base + orders.saturated[0]), (motors,), np.float64)
+    ever = carray(pointer(record + orders.saturated_record), (motors,), np.float64)
+    ever[:] = 0.0
+    flown = number < orders.last
+    function = orders.step if flown else orders.forward
+    for step in range(orders.steps if flown else 1):
+        acting = step == 0 or orders.driven != 0
+        prepared = step == 0 or orders.prepared != 0
+        if step and (acting or prepared):
+            time[0] = (number * orders.steps + step) * orders.physics
+            with_state(orders.get_state, model, data, base + orders.state_row, orders.state)
+        if acting:
+            run(driving, words)
+            _write(fields, base, applied)
+            for i in range(motors):
+                ever[i] = max(ever[i], saturated[i])
+        if prepared:
+            run(preparing, words)
+            if _told(base, orders.told_preparing):
+                return True
+            _write(fields, base, written)
+        if len(masses):
+            _step_burning(orders, function, model, data, base, of_model, fields, derived)
+        else:
+            of_model_and_data(function, model, data)
+        if step == 0:
+            copy_bytes(base + orders.sensors, fields[orders.sensors_word], orders.sensors_size)
+            _copy(record, base, _table(orders.after, 3))
+        elif orders.looks and _look(orders, words, base, fields):
+            return True
+        if acting:
+            _copy(base, base, after_driving)
+    return False
 
 
 @njit
@@ -172,81 +268,36 @@ def _fly(
     fields: Any,
     vehicle: int,
 ) -> None:
-    """Fly a block on a ``memory`` and the ``words`` placed there, which the caller keeps alive."""
+    """Fly halves of a block on a ``memory`` and the ``words`` placed there, both kept alive.
+
+    Where a step effect has an event to tell, the vehicle flies no further.
+    """
     base = address_of(memory)
-    looking, sensing = _table(orders.looking, 5), _table(orders.sensing, 5)
-    driving, preparing = _table(orders.driving, 5), _table(orders.preparing, 5)
-    inputs, remembered = _table(orders.inputs, 5), _table(orders.remembered, 3)
-    after_looking, after_sensing = _table(orders.after_looking, 3), _table(orders.after_sensing, 3)
-    after_driving = _table(orders.after_driving, 3)
-    before, after = _table(orders.before, 3), _table(orders.after, 3)
-    applied, written = _table(orders.applied, 4), _table(orders.written, 4)
-    masses = _table(orders.masses, 4)
+    inputs, commands = _table(orders.inputs, 5), _table(orders.commands, 5)
+    remembered = _table(orders.remembered, 3)
     time = carray(pointer(base + orders.time), (1,), np.float64)
-    motors = orders.saturated[1]
-    saturated = carray(pointer(base + orders.saturated[0]), (motors,), np.float64)
-    row = orders.row + vehicle * orders.row_stride
     stopped = carray(pointer(orders.stopped + 8 * vehicle), (1,), np.int64)
-    derived = np.zeros(2, np.bool_)
+    row = orders.row + vehicle * orders.row_stride
+    derived = np.zeros(3, np.bool_)
     _copy(base, row, remembered)
-    for k in range(orders.count):
+    for half in range(orders.begin, orders.end):
+        k = half // 2
         number = orders.first + k
-        flown = number < orders.last
         record = orders.record + k * orders.period_stride + vehicle * orders.vehicle_stride
-        ever = carray(pointer(record + orders.saturated_record), (motors,), np.float64)
-        ever[:] = 0.0
-        time[0] = number * orders.control
-        with_state(orders.get_state, model, data, base + orders.state_row, orders.state)
-        if orders.looks_first:
-            of_model_and_data(orders.step1, model, data)
-            if _look(orders, looking, words, base, fields):
-                stopped[0] = k
-                return
-            _copy(base, base, after_looking)
-        for i in range(len(inputs)):
-            source = inputs[i, 1] + k * inputs[i, 2] + vehicle * inputs[i, 3]
-            copy_bytes(base + inputs[i, 0], source, inputs[i, 4])
-        run(sensing, words)
-        if _told(base, orders.told_sensing):
+        if half % 2 == 0 or half == orders.begin:
+            time[0] = number * orders.control
+            with_state(orders.get_state, model, data, base + orders.state_row, orders.state)
+        if half % 2 == 0:
+            _copy_inputs(base, inputs, k, vehicle)
+            told = _begin_period(orders, base, words, model, data, fields, record)
+        else:
+            _copy_inputs(base, commands, k, vehicle)
+            told = _fly_steps(
+                *(orders, base, words, model, data, of_model, fields, record, number, derived)
+            )
+        if told:
             stopped[0] = k
             return
-        _copy(record, base, before)
-        _copy(base, base, after_sensing)
-        for step in range(orders.steps if flown else 1):
-            acting = step == 0 or orders.driven != 0
-            prepared = step == 0 or orders.prepared != 0
-            if step and (acting or prepared):
-                time[0] = (number * orders.steps + step) * orders.physics
-                with_state(orders.get_state, model, data, base + orders.state_row, orders.state)
-            if acting:
-                run(driving, words)
-                _write(fields, base, applied)
-                for i in range(motors):
-                    ever[i] = max(ever[i], saturated[i])
-            if prepared:
-                run(preparing, words)
-                if _told(base, orders.told_preparing):
-                    stopped[0] = k
-                    return
-                _write(fields, base, written)
-            function = orders.step if flown else orders.forward
-            if len(masses):
-                if (k == 0 and step == 0) or _differs(of_model, base, masses):
-                    _write_masses(orders, of_model, base)
-                    derived[0] = False
-                _step_burning(orders, function, model, data, base, fields, derived)
-            else:
-                of_model_and_data(function, model, data)
-            if step == 0:
-                copy_bytes(base + orders.sensors, fields[orders.sensors_word], orders.sensors_size)
-                _copy(record, base, after)
-            elif orders.looks:
-                if _look(orders, looking, words, base, fields):
-                    stopped[0] = k
-                    return
-                _copy(base, base, after_looking)
-            if acting:
-                _copy(base, base, after_driving)
     for i in range(len(remembered)):
         copy_bytes(row + remembered[i, 1], base + remembered[i, 0], remembered[i, 2])
 

@@ -34,19 +34,20 @@ def compile_period(
     reference: DesiredMotion,
     *,
     law: bool,
+    sensors: bool = True,
 ) -> PeriodProgram:
     """Return the program of a period like the ``example``, at which ``reference`` is desired.
 
-    Without ``law`` it begins with the law's command.
+    Without the ``law``, which is then called between sensors and actuators; or without both.
 
     Raises:
-        Untraceable: the law or an actuator does what cannot be taken down, and where.
+        Untraceable: the law or another part does what cannot be taken down, and where.
     """
     try:
         with np.errstate(all="ignore"):
             tracing = _Tracing(assembly, layout, effects, example, reference)
             if not law:
-                return tracing.of_command(example)
+                return tracing.of_command(example, sensors=sensors)
             with refusing_hidden_memory(tracing.law) as tracing.law:
                 return tracing.with_law()
     except (FlightError, TypeError, ValueError) as error:
@@ -93,17 +94,11 @@ class _Tracing(TracedArrays):
         Raises:
             Untraceable: as ``compile_period``; or sensors sample at times of their own.
         """
-        steps = self.assembly.scenario.rates.steps
-        if self.suite.ticks - {steps}:
-            raise Untraceable("sensors sample at other times than the control instants")
         before = tuple(self.sensors.values())
         with self.program.section() as sensing:
-            # Not of sample 0, which integrating sensors begin with.
-            sampled, measurement = self.suite.sample(
-                self.traced_arrays(self.sensors), steps, self._truth()
-            )
-            after = self.following(before, tuple(sampled[name] for name in self.sensors))
-            reports = self._reports(measurement)
+            after, measurement = self._sample()
+            # Of ideal sensors a block computes it for all of its periods at once.
+            reports = self._reports(measurement) if self.suite.ticks else []
             state, command, signals = self._law_step(measurement)
             state = self.following(self.law_state, state)
             alarms = self._alarms(measurement, command, signals)
@@ -113,17 +108,15 @@ class _Tracing(TracedArrays):
         for target, source in changed:
             target[...] = source
         recorded = [*_recorded("law", self.law_state), *_recorded("signals", signals)]
-        recorded += [Recorded("sensors", name, array) for name, array in self.sensors.items()]
-        recorded += reports
         return self._compiled(
             command,
             sensing=Section(sensing[0], changed, alarms),
-            recorded=recorded,
+            recorded=[*recorded, *_recorded("command", command), *reports],
             kinds={"law": type(self.law_state), "signals": type(signals)},
         )
 
-    def of_command(self, example: ControlPeriod) -> PeriodProgram:
-        """Return the program of the actuators under the law's command, as that of the ``example``.
+    def of_command(self, example: ControlPeriod, *, sensors: bool) -> PeriodProgram:
+        """Return the program of the actuators under the law's command, and of the ``sensors``.
 
         Raises:
             Untraceable: as ``compile_period``; or the law has an inner loop.
@@ -132,22 +125,27 @@ class _Tracing(TracedArrays):
             raise Untraceable("the law has an inner loop")
         if any(tick % self.assembly.scenario.rates.steps for tick in self.suite.ticks):
             raise Untraceable("sensors sample between control instants")
-        if self._alarms(example.measurement, example.command, example.signals).size:
+        if any(effect.waits for effect in self.effects):
             raise Untraceable("a step effect waits for a signal")
-        with self.program.section() as nothing:
-            pass
+        before = after = tuple(self.sensors.values())
+        reports = []
+        with self.program.section() as sensing:
+            if sensors:
+                after, measurement = self._sample()
+                reports = self._reports(measurement)
+        prove(sensing[0], self.program.memory)
         held = (self.held_of_one(np.asarray(each, float)) for each in example.command)
         return self._compiled(
             tuple_like(example.command, held),
-            sensing=Section(nothing[0], [], np.zeros(0)),
-            recorded=[],
+            sensing=Section(sensing[0], changes(before, after), np.zeros(0)),
+            recorded=reports,
             kinds={},
         )
 
     def _compiled(
         self, command: Any, *, sensing: Section, recorded: list[Recorded], kinds: dict[str, type]
     ) -> PeriodProgram:
-        """Return the program that goes on with the actuators; ``recorded`` is of the law."""
+        """Return the program that goes on with the actuators; ``recorded`` is of what is before."""
         own = tuple(self.memory.values())
         with self.program.section() as driving:
             truth, motors, inner = self._truth(), self.traced_tuple(command), self.law_state
@@ -172,7 +170,7 @@ class _Tracing(TracedArrays):
         preparing, written, masses = self._preparing(remembers)
         before = [Recorded("physics", "", self.physics)]
         before += [Recorded("memory", name, array) for name, array in self.memory.items()]
-        before += [*recorded, *_recorded("command", command)]
+        before += recorded
         after = [Recorded("sensordata", "", self.sensordata)]
         after += [Recorded("applied", str(index), array) for index, array in enumerate(outputs)]
         changed = changes(self.law_state, inner) + changes(own, remembered)
@@ -205,10 +203,13 @@ class _Tracing(TracedArrays):
 
     def _alarms(self, measurement: Any, command: Any, signals: Any) -> np.ndarray:
         """Return where step effects have an event to tell after the law's step."""
+        waiting = [effect for effect in self.effects if effect.waits]
+        if not waiting:
+            return np.zeros(0)
         topics = {"truth": self._truth(), "measurement": measurement}
         topics |= {"command": command, "law": signals}
-        memory, time = self.traced_arrays(self.memory), self.traced(self.time)
-        return self._report([effect.alarm(memory, time, topics) for effect in self.effects])
+        memory = self.traced_arrays(self.memory)
+        return self._report([effect.alarm(memory, topics) for effect in waiting])
 
     def _looking(self) -> Section:
         """Return what step effects see."""
@@ -263,17 +264,25 @@ class _Tracing(TracedArrays):
         physics, memory = self.traced(self.physics), self.traced_arrays(self.memory)
         return truth_of(physics, memory, self.layout, self.assembly.actuators, self.effects)
 
-    def _reports(self, measurement: Any) -> list[Recorded]:
-        """Return what is recorded of the ``measurement``; nothing where it follows from the truth.
+    def _sample(self) -> tuple[Any, Any]:
+        """Return what the sensors remember after a sample, and the measurement."""
+        steps = self.assembly.scenario.rates.steps
+        if self.suite.ticks - {steps}:
+            raise Untraceable("sensors sample at other times than the control instants")
+        # Not of sample 0, which integrating sensors begin with.
+        sampled, measurement = self.suite.sample(
+            self.traced_arrays(self.sensors), steps, self._truth()
+        )
+        before = tuple(self.sensors.values())
+        return self.following(before, tuple(sampled[name] for name in self.sensors)), measurement
 
-        Of ideal sensors a block computes it for all of its periods at once.
-        """
-        if not self.suite.ticks:
-            return []
+    def _reports(self, measurement: Any) -> list[Recorded]:
+        """Return what is recorded of sensors: what they remembered, and the ``measurement``."""
         values = {name: value for name, value in measurement._asdict().items() if value.size}
         arrays = self.numbers(tuple(values.values()))
         return [
-            Recorded("measurement", name, array) for name, array in zip(values, arrays, strict=True)
+            *(Recorded("sensors", name, array) for name, array in self.sensors.items()),
+            *(Recorded("measurement", n, a) for n, a in zip(values, arrays, strict=True)),
         ]
 
     def _law_step(self, measurement: Any) -> tuple[Any, Any, Any]:

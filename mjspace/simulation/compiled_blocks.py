@@ -1,14 +1,15 @@
 """Compiled blocks of a flight, each proved by its first period, which Python flies as well."""
 
+import itertools
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 from mujoco.batch import SimulationError
 
-from mjspace.contract import TICK, Array, DesiredMotion
+from mjspace.contract import TICK, Array, DesiredMotion, Measurement
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compile_period import compile_period
@@ -16,7 +17,8 @@ from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import Start
-from mjspace.simulation.recording import OF_THE_LAW, Columns, Recording
+from mjspace.simulation.law_calls import LawCalls
+from mjspace.simulation.recording import OF_SENSORS, Columns, Recording
 from mjspace.simulation.stepper import Stepper
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.vehicle.step_effect import State
@@ -57,14 +59,15 @@ class CompiledBlocks:
         """Return what is compiled, in one line."""
         if not self.on:
             return f"flown in Python: {self.reason}"
-        if self.reason:
-            also = " and step effects" if self._stepper.effects else ""
-            return f"actuators{also} compiled; sensors and law called in Python: {self.reason}"
-        effects = self._stepper.effects
-        if not effects:
-            return "compiled: sensors, law and actuators"
-        names = ", ".join(effect.name for effect in effects)
-        return f"compiled: sensors, law, actuators and step effects ({names})"
+        called = ["law"] if self.reason else []
+        if called and (self._flight is None or not self._flight.has_sensors):
+            called = ["sensors", "law"]
+        parts = [part for part in ("sensors", "law", "actuators") if part not in called]
+        if effects := ", ".join(effect.name for effect in self._stepper.effects):
+            parts.append(f"step effects ({effects})")
+        if not called:
+            return f"compiled: {_listed(parts)}"
+        return f"{_listed(parts)} compiled; {_listed(called)} called in Python: {self.reason}"
 
     def fly(
         self,
@@ -90,24 +93,24 @@ class CompiledBlocks:
             flight = self._flight or self._compile(first, desired)
             flight.follow({name: self._stepper.batch.expand(name) for name in self._fields})
             flight.set(first.physics, first.memory, first.sensors, first.law)
-            flight.begin(first.number, count, last)
             if flight.has_law:
-                flight.fly(desired)
-                stopped = int(flight.stopped.min())
-                if 2 <= stopped < count:  # Python flies the period in which something is told
+                flight.begin(first.number, count, last, desired, ())
+                flight.fly_periods(count)
+                if 2 <= flight.told < count:  # Python flies the period in which something is told
+                    count = flight.told
                     flight.set(first.physics, first.memory, first.sensors, first.law)
-                    flight.begin(first.number, stopped, last)
-                    flight.fly(desired)
+                    flight.begin(first.number, count, last, desired, ())
+                    flight.fly_periods(count)
                 compiled = flight.columns()
             else:
-                compiled, trouble = self._fly_law_in_python(flight, first, count, desired, stop)
+                compiled, trouble = self._call_law(flight, first, count, last, desired, stop)
         except (Untraceable, SimulationError) as error:
             self._off(str(error), after)  # MuJoCo raises the same in Python, which reports it
             return columns, None
         if flight.warned:
             self._off("MuJoCo warned", after)
             return columns, None
-        if len(compiled) < 2:
+        if flight.told < 2:
             self._go_back_to(after)
             return columns, None
         different = _difference(columns, compiled) or second.difference(compiled)
@@ -122,53 +125,73 @@ class CompiledBlocks:
             return columns, None
         self._take(flight)
         if flight.has_law:
-            self._stepper.sensors = _copied(flight.sensors)
             kind: Any = type(flight.law)
             self._law.state = kind(*(values.copy() for values in flight.law)) if flight.law else ()
         return compiled, trouble
 
-    def _fly_law_in_python(
+    def _call_law(
         self,
         flight: CompiledFlight,
         first: ControlPeriod,
         count: int,
+        last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
     ) -> tuple[Columns, FlightError | None]:
-        """Fly the block with the law, and the sensors, called in each period.
+        """Fly the block with the law called in each period, and the sensors if not compiled.
 
         Return its columns, and what the law raised after them.
         """
-        trouble: FlightError | None = None
-        recording = Recording(first, count, OF_THE_LAW)
-        flight.fly_period(first.command)
-        if flight.stopped.min() == 0:
-            return flight.columns(), None
-        recording.write(first)
+        calls = LawCalls(self._law, first, count, self._stepper.check)
+        flight.begin(first.number, count, last, desired, calls.commands)
+        flight.fly_to_instant(0)
+        sensing = None if flight.has_sensors else Recording(first, count, OF_SENSORS)
+        measured: Iterator[Sequence[Measurement]]
+        if sensing is None:
+            measured = calls.measurements(flight.measured())
+        else:
+            measured = self._sensed(flight, first, calls, sensing)
+        control = self._assembly.scenario.rates.control
         rows: Any = zip(*(array[1:count] for array in desired), strict=True)
-        for number, row in enumerate(rows, first.number + 1):
+        flown, trouble = 1, None
+        with np.errstate(all="ignore"):
+            for k, row in enumerate(rows, 1):
+                flight.fly_to_instant(k)
+                if flight.told <= k:
+                    break
+                time = (first.number + k) * control
+                try:
+                    calls.step(k, time, next(measured), type(desired)(*row))
+                except FlightError as error:
+                    trouble = stopped_at(time, error)
+                    break
+                flown = k + 1
+                if stop():
+                    break
+        flight.fly_periods(flown)
+        if flight.told < count:  # Python flies the period in which something is told
+            flown, trouble = min(flown, flight.told), None
+            flight.set(first.physics, first.memory, first.sensors, first.law)
+            flight.begin(first.number, flown, last, desired, calls.commands)
+            flight.fly_periods(flown)
+            if sensing is not None:
+                self._stepper.sensors = sensing.sensors_before(flown, self._stepper.sensors)
+        self._law.state = calls.state_before(flown)
+        groups = flight.columns().groups | calls.groups(flown)
+        if sensing is not None:
+            groups |= sensing.columns(flown).groups
+        return Columns(groups, [], calls.kinds), trouble
+
+    def _sensed(
+        self, flight: CompiledFlight, first: ControlPeriod, calls: LawCalls, recording: Recording
+    ) -> Iterator[Sequence[Measurement]]:
+        """Yield what each call of the law measures in each period, of sensors called in Python."""
+        recording.write(first)
+        for number in itertools.count(first.number + 1):
             self._take(flight)
-            before = self._after_a_period()
             period = self._stepper.sense(number)
-            try:
-                period.law, period.command, period.signals = self._law.step(
-                    period.time, period.measurement, type(desired)(*row)
-                )
-                self._stepper.check(period.command)
-            except FlightError as error:
-                trouble = stopped_at(period.time, error)
-                break
-            flight.remember(period.memory)
-            flight.fly_period(period.command)
-            if flight.stopped.min() == 0:  # Python flies the period in which something is told
-                self._go_back_to(before)
-                flight.set(before.physics, before.memory, before.sensors, before.law)
-                break
             recording.write(period)
-            if stop():
-                break
-        of_law, columns = recording.columns(), flight.columns()
-        return Columns(of_law.groups | columns.groups, of_law.events, of_law.kinds), trouble
+            yield calls.of_each(period.measurement)
 
     def _due(self, number: int) -> int:
         """Return the first period from that ``number`` on in which an event is sure to happen."""
@@ -180,6 +203,8 @@ class CompiledBlocks:
         """Put the stepper where the compiled flight is."""
         self._stepper.batch.state[...] = flight.physics
         self._stepper.memory = _copied(flight.memory)
+        if flight.has_sensors:
+            self._stepper.sensors = _copied(flight.sensors)
 
     def _compile(self, example: ControlPeriod, desired: DesiredMotion) -> CompiledFlight:
         """Return the compiled flight, of the law too if that can be.
@@ -189,14 +214,16 @@ class CompiledBlocks:
         """
         arguments = self._assembly, self._stepper.layout, self._stepper.effects, example
         reference = type(desired)(*(each[0] for each in desired))
-        try:
-            period = compile_period(*arguments, reference, law=True)
-        except Untraceable as error:
-            self.reason = str(error)
+        reasons = []
+        for law, sensors in ((True, True), (False, True), (False, False)):
             try:
-                period = compile_period(*arguments, reference, law=False)
-            except Untraceable as another:
-                raise Untraceable(f"{error}, and {another}") from another
+                period = compile_period(*arguments, reference, law=law, sensors=sensors)
+                break
+            except Untraceable as error:
+                reasons.append(str(error))
+        else:
+            raise Untraceable(", and ".join(dict.fromkeys(reasons)))
+        self.reason = ", and ".join(dict.fromkeys(reasons))
         self._flight = CompiledFlight(
             self._assembly,
             self._stepper.layout,
@@ -222,6 +249,12 @@ class CompiledBlocks:
         stepper = self._stepper
         stepper.batch.state[...] = then.physics
         stepper.memory, stepper.sensors, self._law.state = then[1:]
+
+
+def _listed(parts: Sequence[str]) -> str:
+    """Return the parts as a sentence has them."""
+    *others, last = parts
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def stopped_at(time: float, error: Exception) -> FlightError:

@@ -1,6 +1,7 @@
 """Blocks of control periods flown by compiled code, every vehicle on a thread of MuJoCo's batch."""
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,9 +29,8 @@ class CompiledFlight:
         memory: what the actuators remember, by name, (N, ...).
         sensors: what the sensors remember, likewise.
         law: the law's state, a named tuple of arrays (N, ...), or empty.
-        stopped: how many periods of the block each has flown, (N,): it stops before one in which a
-            step effect has an event to tell.
-        command: the law's command, arrays (N, ...), where the period begins with it.
+        stopped: in which period of the block each had an event to tell, (N,); if none, how many the
+            block has.
     """
 
     def __init__(
@@ -52,9 +52,8 @@ class CompiledFlight:
         self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model, own)
         self._suite = assembly.sensors(members)
         self.physics = self._batch.state
-        made = () if period.has_law else period.command
         named = (period.memory, period.sensors, period.biases)
-        remembered = [*(a for arrays in named for a in arrays.values()), *period.law, *made]
+        remembered = [*(a for arrays in named for a in arrays.values()), *period.law]
         places, size = _packed(remembered)
         self._rows = np.zeros((vehicles, size), np.uint8)
         views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
@@ -62,18 +61,17 @@ class CompiledFlight:
         self.memory, self.sensors, biases = (
             {name: next(one_by_one) for name in arrays} for arrays in named
         )
-        views = list(one_by_one)
         for name, bias in self._suite.biases.items():
             biases[name][...] = bias
-        self.law = type(period.law)(*views[: len(period.law)]) if period.law else ()
-        self.command = views[len(period.law) :]
+        self.law = type(period.law)(*one_by_one) if period.law else ()
         self._record_places, self._record_size = _packed(
             [*(each.array for each in (*period.before, *period.after)), period.saturated]
         )
         self.stopped = np.zeros(vehicles, np.int64)
         self._tables: list[np.ndarray] = []
         self._orders = self._constant_orders(remembered, places)
-        self._function = block_function().address
+        self._halves = _halves_of(self._orders)
+        self._apply = partial(self._batch.apply, block_function().address, self._orders.ctypes.data)
 
     def set(
         self, physics: Array, memory: dict[str, Array], sensors: dict[str, Array], law: Any
@@ -95,63 +93,70 @@ class CompiledFlight:
         for name, values in self.memory.items():
             values[...] = memory[name]
 
-    def begin(self, first: int, count: int, last: int) -> None:
+    def begin(
+        self, first: int, count: int, last: int, desired: DesiredMotion, commands: Sequence[Array]
+    ) -> None:
         """Begin a block of ``count`` periods from number ``first`` on.
 
-        The flight's ``last`` is not flown.
+        ``desired`` has at least a row for each of them. ``commands`` are the arrays of the law's
+        commands, (count, N, ...), where the law is not compiled: those of a period are read when
+        its steps are flown. The flight's ``last`` period has none.
         """
-        self._first, self._flown = first, 0
+        self._flown = 0  # halves of periods
+        self.stopped[:] = count
         self._recorded = np.empty((count, len(self.physics), self._record_size), np.uint8)
-        orders = self._orders
-        orders["last"] = last
-        times = (first + np.arange(count, dtype=float)) * self._assembly.scenario.rates.control
-        self._known = [effect.known(times)[:, None] for effect in self._effects]
+        self._recorded.setflags(write=False)  # but by the compiled function
+        period, orders = self._period, self._orders
+        orders["first"], orders["last"] = first, last
+        orders["record"] = self._recorded.ctypes.data
         orders["period_stride"], orders["vehicle_stride"] = self._recorded.strides[:2]
+        draws = self._suite.draws(range(first, first + count))
+        # The same for every vehicle, and of each its own.
+        rows = [np.ascontiguousarray(array[:count])[:, None] for array in desired]
+        times = (first + np.arange(count, dtype=float)) * self._assembly.scenario.rates.control
+        known = [effect.known(times)[:, None] for effect in self._effects]
+        inputs = (
+            (*period.reference, *period.draws.values(), *period.known),
+            (*rows, *draws.values(), *known),
+        )
+        made: Any = () if period.has_law else period.command
+        given = (*made, *period.known), (*commands, *known)
+        self._of_block: tuple[Any, ...] = rows, draws, known, commands  # kept: read by address
+        for name, (targets, sources) in (("inputs", inputs), ("commands", given)):
+            table = _table(map(self._input, targets, sources))
+            self._of_block += (table,)
+            orders[name] = table.ctypes.data, len(table)
 
-    def fly(self, desired: DesiredMotion) -> None:
-        """Fly the whole block with its law; ``desired`` has at least a row for each period.
+    def fly_to_instant(self, period: int) -> None:
+        """Fly on to the control instant of that ``period`` of the block, sensors included.
 
-        A warning of MuJoCo's is left to be found in ``warned``, and an event in ``stopped``.
+        A warning of MuJoCo's is left to be found in ``warned``.
 
         Raises:
             mujoco.batch.SimulationError: MuJoCo raised an error.
         """
-        period, count = self._period, len(self._recorded)
-        # The same for every vehicle, and of each its own.
-        rows = [np.ascontiguousarray(array[:count])[:, None] for array in desired]
-        rows += self._suite.draws(range(self._first, self._first + count)).values()
-        self._fly(count, (*period.reference, *period.draws.values()), rows)
+        self._fly_halves(2 * period + 1)
 
-    def fly_period(self, command: Any) -> None:
-        """Fly the next period of the block under the law's ``command``, as ``fly`` does.
+    def fly_periods(self, count: int) -> None:
+        """Fly on until so many periods of the block have been flown; as ``fly_to_instant``.
 
         Raises:
-            mujoco.batch.SimulationError: as ``fly``.
+            mujoco.batch.SimulationError: as ``fly_to_instant``.
         """
-        for target, values in zip(self.command, command, strict=True):
-            target[...] = values
-        self._fly(1, (), [])
+        self._fly_halves(2 * count)
 
-    def _fly(self, count: int, targets: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> None:
-        """Fly the next ``count`` periods with ``rows``, one for each, put into the ``targets``."""
-        orders, recorded, begun = self._orders, self._recorded, self._flown
-        rows = [*rows, *(known[begun:] for known in self._known)]
-        inputs = _table(
-            (
-                self._offset(to),
-                of.ctypes.data,
-                of.strides[0],
-                of.strides[1] if of.shape[1] > 1 else 0,
-                to.nbytes,
-            )
-            for to, of in zip((*targets, *self._period.known), rows, strict=True)
-        )
-        orders["inputs"] = inputs.ctypes.data, len(inputs)
-        orders["first"], orders["count"] = self._first + begun, count
-        orders["record"] = recorded.ctypes.data + begun * recorded.strides[0]
-        self.stopped[:] = count
-        self._batch.apply(self._function, orders.ctypes.data)
-        self._flown += int(self.stopped.min())
+    def _fly_halves(self, end: int) -> None:
+        self._halves[0], self._halves[1] = self._flown, end
+        self._apply()
+        self._flown = end
+
+    @property
+    def told(self) -> int:
+        """The first period of the block in which a step effect has an event to tell.
+
+        Nothing is known of it and of what follows. As many as the block has, where there is none.
+        """
+        return int(self.stopped.min())
 
     @property
     def has_law(self) -> bool:
@@ -159,13 +164,30 @@ class CompiledFlight:
         return self._period.has_law
 
     @property
+    def has_sensors(self) -> bool:
+        """Whether the sensors are compiled."""
+        return self.has_law or any(each.group == "measurement" for each in self._period.before)
+
+    @property
     def warned(self) -> bool:
         """Whether MuJoCo has warned of anything."""
         return bool(self._batch.warning[:, :, 1].any())
 
+    def measured(self) -> dict[str, Array]:
+        """Return what sensors report in the block, (count, N, ...), where that is recorded.
+
+        A period's row is filled in at its control instant.
+        """
+        before = zip(self._record_places, self._period.before, strict=False)
+        return {
+            each.name: _view(self._recorded, place, each.array)
+            for place, each in before
+            if each.group == "measurement"
+        }
+
     def columns(self) -> Columns:
         """Return what the block has recorded so far, as views; without the law, if it has none."""
-        period, records = self._period, self._recorded[: self._flown]
+        period, records = self._period, self._recorded[: self._flown // 2]
         names = ("memory", "command", "applied", "wrench")
         groups: dict[str, dict[str, Array]] = {name: {} for name in names}
         recorded = (*period.before, *period.after, Recorded("saturated", "", period.saturated))
@@ -242,7 +264,6 @@ class CompiledFlight:
             struct_offsets.most_constraints(),
         )
         orders["looks"] = any(effect.looks for effect in self._effects)
-        orders["looks_first"] = orders["looks"] and period.has_law  # else Python has looked
         for name in ("looking", "sensing", "preparing"):
             told = getattr(period, name).report
             orders[f"told_{name}"] = (self._offset(told), told.size) if told.size else (0, 0)
@@ -262,6 +283,11 @@ class CompiledFlight:
             used += len(calls.words)
         tables["words"], tables["relative"] = np.concatenate(words), np.concatenate(relative)
         return tables
+
+    def _input(self, to: np.ndarray, of: np.ndarray) -> tuple[int, ...]:
+        """Return the row of an input of each period ``to`` the memory; (count, N or 1, ...)."""
+        of_vehicles = of.strides[1] if of.shape[1] > 1 else 0
+        return self._offset(to), of.ctypes.data, of.strides[0], of_vehicles, to.nbytes
 
     def _offset(self, array: np.ndarray) -> int:
         return self._period.program.offset(array)
@@ -301,6 +327,12 @@ def _view(rows: np.ndarray, place: int, array: np.ndarray) -> Any:
     """Return the values like one vehicle's ``array`` (1, ...) at that place in the ``rows``."""
     part = rows[..., place : place + array.nbytes]
     return part.view(array.dtype).reshape(*rows.shape[:-1], *array.shape[1:])
+
+
+def _halves_of(orders: np.ndarray) -> np.ndarray:
+    """Return what begins with ``begin`` and ``end`` of the orders: a view that is quick to set."""
+    place = ORDERS.fields["begin"][1] // _WORD
+    return orders.reshape(1).view(np.int64)[place : place + 2]
 
 
 def _table(rows: Iterable[tuple[int, ...]]) -> np.ndarray:

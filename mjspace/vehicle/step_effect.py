@@ -80,6 +80,8 @@ class StepEffect(ABC):
     """Why a flight with it is flown in Python; "" where it is compiled."""
     looks: ClassVar[bool] = False
     """Whether it has a ``look``, at each control instant and integration step."""
+    waits: bool = False
+    """Whether it has an ``alarm``, at each control instant."""
     fields: ClassVar[tuple[str, ...]] = ()
     """Of MuJoCo's model, those that it changes with an event."""
     wrench: Array | None = None
@@ -134,13 +136,13 @@ class StepEffect(ABC):
         """
         return memory, np.zeros((len(physics), 1), bool)
 
-    def alarm(self, memory: State, time: Array, topics: Topics) -> Array | None:
+    def alarm(self, memory: State, topics: Topics) -> Array:
         """Return where there is an event to be told at a control instant, True or False (N, 1).
 
         Of a compiled effect, after the law's step. ``topics`` has the named tuples "truth",
         "measurement", "command" and "law".
         """
-        return None
+        return np.zeros((1, 1), bool)
 
     def prepare(
         self, physics: Array, time: Array, known: Array
