@@ -194,10 +194,15 @@ class CompiledBlocks:
             yield calls.of_each(period.measurement)
 
     def _due(self, number: int) -> int:
-        """Return the first period from that ``number`` on in which an event is sure to happen."""
-        control = self._assembly.scenario.rates.control
-        due = min((effect.due(number * control) for effect in self._stepper.effects), default=inf)
-        return int(min((due + TICK) / control, _NEVER))
+        """Return the first period from that ``number`` on in which an event is sure to happen.
+
+        What is due between two integration steps happens in one of them: one before ``number``,
+        where that may be in the first step of it.
+        """
+        rates = self._assembly.scenario.rates
+        after = number * rates.control - rates.physics
+        due = min((effect.due(after) for effect in self._stepper.effects), default=inf)
+        return int(min((due + TICK) / rates.control, _NEVER))
 
     def _take(self, flight: CompiledFlight) -> None:
         """Put the stepper where the compiled flight is."""
