@@ -156,10 +156,7 @@ class _Tracing(TracedArrays):
             memory, applied, saturated = self.assembly.actuators.act(
                 self.traced_arrays(self.memory), motors, truth, self.assembly.hold
             )
-            instant = Instant(
-                *(self.traced(self.time), self.traced(self.physics), truth, None, command, None),
-                *(self.traced_arrays(self.memory), []),
-            )
+            instant = self._instant(truth, command)
             for effect in self.effects:
                 memory, applied = effect.change(memory, applied, instant)
             outputs = self.numbers(applied)
@@ -199,6 +196,20 @@ class _Tracing(TracedArrays):
             before=before,
             after=after,
             kinds=kinds | {"command": type(command)},
+        )
+
+    def _instant(self, truth: Any, command: Any) -> Instant:
+        """Return the instant as effects know it that change what the actuators apply."""
+        unknown: Any = None
+        return Instant(
+            time=self.traced(self.time),
+            physics=self.traced(self.physics),
+            truth=truth,
+            measurement=unknown,
+            command=command,
+            signals=unknown,
+            memory=self.traced_arrays(self.memory),
+            events=[],
         )
 
     def _alarms(self, measurement: Any, command: Any, signals: Any) -> np.ndarray:

@@ -195,15 +195,16 @@ class YoYo(Deployed):
         joint = model.joint(f"{name}_unwind")
         place, speed = int(joint.qposadr[0]), int(joint.dofadr[0])
         weight = model.body(f"{name}_weight").id
+        of_state = int(mujoco.mjtState.mjSTATE_INTEGRATION)
         active, qpos, qvel = (
-            mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION & (component - 1))
+            mujoco.mj_stateSize(model, of_state & (int(component) - 1))
             for component in (
                 mujoco.mjtState.mjSTATE_EQ_ACTIVE,
                 mujoco.mjtState.mjSTATE_QPOS,
                 mujoco.mjtState.mjSTATE_QVEL,
             )
         )
-        columns = active + held, active + wound, qpos + place, qvel + speed
+        columns = int(active + held), int(active + wound), int(qpos + place), int(qvel + speed)
         all_off = float(joint.qpos0[0])
         return cls(name, table.at, held, wound, weight, place, speed, columns, all_off)
 
@@ -230,8 +231,8 @@ class YoYo(Deployed):
 
     def write(self, physics: Array, time: Any, step: float) -> tuple[list[Write], Array | None]:
         """Return nothing to write, and where the weight is let go."""
-        off = self._is_off(*(physics[:, column] for column in self.columns), step)
-        return [], off[:, None]
+        held, wound, angle, rate = (physics[:, column] for column in self.columns)
+        return [], self._is_off(held, wound, angle, rate, step)[:, None]
 
     def _is_off(self, held: Any, wound: Any, angle: Any, rate: Any, step: float) -> Any:
         """Return whether no cord is left on the drum half a ``step`` from now."""
