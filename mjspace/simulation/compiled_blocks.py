@@ -55,6 +55,11 @@ class CompiledBlocks:
         self.on = not self.reason
         self._fields = sorted({name for effect in stepper.effects for name in effect.fields})
 
+    @property
+    def is_to_be_seen(self) -> bool:
+        """Whether none has been flown yet, and nothing keeps the flight in Python."""
+        return self.on and self._flight is None
+
     def __str__(self) -> str:
         """Return what is compiled, in one line."""
         if not self.on:

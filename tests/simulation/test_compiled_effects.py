@@ -223,6 +223,15 @@ def test_a_fault_that_waits_for_a_signal_is_not_compiled_without_the_law(tmp_pat
     assert_same(compiled, flown(built, compiled=False))
 
 
+def test_what_is_compiled_is_seen_after_what_happens_at_the_start(tmp_path: Any) -> None:
+    law = LAW.replace("landing.lander", "attitude.quaternion_feedback")
+    (tmp_path / "own.py").write_text(law.replace("VariableStructure", "Switched"))
+    built = assembly(
+        *("wheel-failure", "duration=1", "law.kind='own.py:Law'", "faults.0.at=0"), folder=tmp_path
+    )
+    assert "law called in Python: a branch" in loop.what_is_compiled(built)
+
+
 def test_a_wrong_look_is_noticed_in_the_first_block(monkeypatch: pytest.MonkeyPatch) -> None:
     built = assembly("lander", *LANDS)
     python, columns = flown(built, compiled=False), CompiledFlight.columns
