@@ -130,7 +130,7 @@ def _copy_inputs(base: int, table: Any, period: int, vehicle: int) -> None:
 def _fly(
     orders: Any, memory: Any, words: Any, model: int, data: int, fields: Any, vehicle: int
 ) -> None:
-    """Fly a part of a block on a ``memory`` and the ``words`` placed there, which the caller keeps alive."""
+    """Fly halves of periods on a ``memory`` and ``words`` placed there, which the caller keeps."""
     base = address_of(memory)
     sensing, driving = _table(orders.sensing, 5), _table(orders.driving, 5)
     inputs, commands = _table(orders.inputs, 5), _table(orders.commands, 5)

@@ -32,7 +32,10 @@ class UnbatchedLaw:
     ) -> tuple[Any, Any, Any]:
         """Return the law's state, command and signals with a vehicle axis."""
         return stacked(
-            [self._step(v, state, time, measurement, reference) for v in range(len(measurement.rate))]
+            [
+                self._step(v, state, time, measurement, reference)
+                for v in range(len(measurement.rate))
+            ]
         )
 
     def step_of_one(
