@@ -3,12 +3,13 @@
 import itertools
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 from mujoco.batch import SimulationError
 
-from mjspace.contract import Array, DesiredMotion, Measurement
+from mjspace.contract import TICK, Array, DesiredMotion, Measurement
 from mjspace.errors import FlightError
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compile_period import compile_period
@@ -21,6 +22,8 @@ from mjspace.simulation.recording import OF_SENSORS, Columns, Recording
 from mjspace.simulation.stepper import Stepper
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.vehicle.step_effect import State
+
+_NEVER = 2**62
 
 
 class CompiledBlocks:
@@ -44,19 +47,32 @@ class CompiledBlocks:
         self._members, self._threads = members, threads
         self._stepper, self._law = stepper, law
         self._flight: CompiledFlight | None = None
-        effects = ", ".join(effect.name for effect in stepper.effects)
-        self.reason = f"step effects are not compiled ({effects})" if effects else ""
-        self.on = not effects
+        self.reason = ", and ".join(
+            f"{effect.name}: {effect.not_compiled}"
+            for effect in stepper.effects
+            if effect.not_compiled
+        )
+        self.on = not self.reason
+        self._fields = sorted({name for effect in stepper.effects for name in effect.fields})
+
+    @property
+    def is_to_be_seen(self) -> bool:
+        """Whether none has been flown yet, and nothing keeps the flight in Python."""
+        return self.on and self._flight is None
 
     def __str__(self) -> str:
         """Return what is compiled, in one line."""
         if not self.on:
             return f"flown in Python: {self.reason}"
-        if not self.reason:
-            return "compiled: sensors, law and actuators"
-        if self._flight is not None and self._flight.has_sensors:
-            return f"sensors and actuators compiled; law called in Python: {self.reason}"
-        return f"actuators compiled; sensors and law called in Python: {self.reason}"
+        called = ["law"] if self.reason else []
+        if called and (self._flight is None or not self._flight.has_sensors):
+            called = ["sensors", "law"]
+        parts = [part for part in ("sensors", "law", "actuators") if part not in called]
+        if effects := ", ".join(effect.name for effect in self._stepper.effects):
+            parts.append(f"step effects ({effects})")
+        if not called:
+            return f"compiled: {_listed(parts)}"
+        return f"{_listed(parts)} compiled; {_listed(called)} called in Python: {self.reason}"
 
     def fly(
         self,
@@ -73,13 +89,23 @@ class CompiledBlocks:
         be had, or differs from them or in the state that they lead to, they are returned, and
         Python flies on. ``stop`` is called in each period in which the law is called in Python.
         """
+        count = min(count, self._due(first.number + 1) - first.number)
+        if count < 2 or columns.events:  # compiled code has no events, and cannot be held to it
+            return columns, None
         after, trouble = self._after_a_period(), None
+        second = after._replace(memory=self._stepper.observed(first.number + 1))
         try:
             flight = self._flight or self._compile(first, desired)
+            flight.follow({name: self._stepper.batch.expand(name) for name in self._fields})
             flight.set(first.physics, first.memory, first.sensors, first.law)
             if flight.has_law:
                 flight.begin(first.number, count, last, desired, ())
                 flight.fly_periods(count)
+                if 2 <= flight.told < count:  # Python flies the period in which something is told
+                    count = flight.told
+                    flight.set(first.physics, first.memory, first.sensors, first.law)
+                    flight.begin(first.number, count, last, desired, ())
+                    flight.fly_periods(count)
                 compiled = flight.columns()
             else:
                 compiled, trouble = self._call_law(flight, first, count, last, desired, stop)
@@ -89,7 +115,10 @@ class CompiledBlocks:
         if flight.warned:
             self._off("MuJoCo warned", after)
             return columns, None
-        different = _difference(columns, compiled) or after.difference(compiled)
+        if flight.told < 2:
+            self._go_back_to(after)
+            return columns, None
+        different = _difference(columns, compiled) or second.difference(compiled)
         if different:
             warnings.warn(
                 f"compiled, {different} differs from what Python computes at t = "
@@ -133,6 +162,8 @@ class CompiledBlocks:
         with np.errstate(all="ignore"):
             for k, row in enumerate(rows, 1):
                 flight.fly_to_instant(k)
+                if flight.told <= k:
+                    break
                 time = (first.number + k) * control
                 try:
                     calls.step(k, time, next(measured), type(desired)(*row))
@@ -143,6 +174,13 @@ class CompiledBlocks:
                 if stop():
                     break
         flight.fly_periods(flown)
+        if flight.told < count:  # Python flies the period in which something is told
+            flown, trouble = min(flown, flight.told), None
+            flight.set(first.physics, first.memory, first.sensors, first.law)
+            flight.begin(first.number, flown, last, desired, calls.commands)
+            flight.fly_periods(flown)
+            if sensing is not None:
+                self._stepper.sensors = sensing.sensors_before(flown, self._stepper.sensors)
         self._law.state = calls.state_before(flown)
         groups = flight.columns().groups | calls.groups(flown)
         if sensing is not None:
@@ -160,6 +198,17 @@ class CompiledBlocks:
             recording.write(period)
             yield calls.of_each(period.measurement)
 
+    def _due(self, number: int) -> int:
+        """Return the first period from that ``number`` on in which an event is sure to happen.
+
+        What is due between two integration steps happens in one of them: one before ``number``,
+        where that may be in the first step of it.
+        """
+        rates = self._assembly.scenario.rates
+        after = number * rates.control - rates.physics
+        due = min((effect.due(after) for effect in self._stepper.effects), default=inf)
+        return int(min((due + TICK) / rates.control, _NEVER))
+
     def _take(self, flight: CompiledFlight) -> None:
         """Put the stepper where the compiled flight is."""
         self._stepper.batch.state[...] = flight.physics
@@ -173,7 +222,7 @@ class CompiledBlocks:
         Raises:
             Untraceable: not even the actuators can be compiled.
         """
-        arguments = self._assembly, self._stepper.layout, example
+        arguments = self._assembly, self._stepper.layout, self._stepper.effects, example
         reference = type(desired)(*(each[0] for each in desired))
         reasons = []
         for law, sensors in ((True, True), (False, True), (False, False)):
@@ -188,6 +237,7 @@ class CompiledBlocks:
         self._flight = CompiledFlight(
             self._assembly,
             self._stepper.layout,
+            self._stepper.effects,
             period,
             self._start,
             self._members,
@@ -202,9 +252,19 @@ class CompiledBlocks:
     def _off(self, reason: str, after: "_After") -> None:
         """Let Python fly on from ``after`` the first period."""
         self.on, self.reason, self._flight = False, reason, None
+        self._go_back_to(after)
+
+    def _go_back_to(self, then: "_After") -> None:
+        """Put stepper and law where they were ``then``, after another period."""
         stepper = self._stepper
-        stepper.batch.state[...] = after.physics
-        stepper.memory, stepper.sensors, self._law.state = after[1:]
+        stepper.batch.state[...] = then.physics
+        stepper.memory, stepper.sensors, self._law.state = then[1:]
+
+
+def _listed(parts: Sequence[str]) -> str:
+    """Return the parts as a sentence has them."""
+    *others, last = parts
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def stopped_at(time: float, error: Exception) -> FlightError:

@@ -16,6 +16,7 @@ from mjspace.simulation.period_program import Copies, PeriodProgram, Recorded
 from mjspace.simulation.recording import Columns
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
+from mjspace.vehicle.step_effect import StepEffect, Write
 
 _WORD = 8  # bytes
 
@@ -28,12 +29,15 @@ class CompiledFlight:
         memory: what the actuators remember, by name, (N, ...).
         sensors: what the sensors remember, likewise.
         law: the law's state, a named tuple of arrays (N, ...), or empty.
+        stopped: in which period of the block each had an event to tell, (N,); if none, how many the
+            block has.
     """
 
     def __init__(
         self,
         assembly: Assembly,
         layout: StateLayout,
+        effects: Sequence[StepEffect],
         period: PeriodProgram,
         start: Start,
         members: Sequence[int],
@@ -41,8 +45,11 @@ class CompiledFlight:
     ) -> None:
         """Put them into a batch with the fields of MuJoCo's model of the ``start``."""
         self._assembly, self._layout, self._period = assembly, layout, period
+        self._effects = effects
         vehicles = len(start.physics)
-        self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model)
+        # Threads that write masses, and derive what follows from them, have models of their own.
+        own = {each.array for each in period.masses} | ({"bvh_aabb"} if period.masses else set())
+        self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model, own)
         self._suite = assembly.sensors(members)
         self.physics = self._batch.state
         named = (period.memory, period.sensors, period.biases)
@@ -60,6 +67,7 @@ class CompiledFlight:
         self._record_places, self._record_size = _packed(
             [*(each.array for each in (*period.before, *period.after)), period.saturated]
         )
+        self.stopped = np.zeros(vehicles, np.int64)
         self._tables: list[np.ndarray] = []
         self._orders = self._constant_orders(remembered, places)
         self._begin, self._end = (self._orders[name].reshape(1) for name in ("begin", "end"))
@@ -70,11 +78,20 @@ class CompiledFlight:
     ) -> None:
         """Put the vehicles there, with what is remembered."""
         self.physics[...] = physics
-        for own, others in ((self.memory, memory), (self.sensors, sensors)):
-            for name, values in own.items():
-                values[...] = others[name]
+        self.remember(memory)
+        for name, values in self.sensors.items():
+            values[...] = sensors[name]
         for target, values in zip(self.law, law, strict=True):
             target[...] = values
+
+    def follow(self, fields: dict[str, Array]) -> None:
+        """Take over fields of MuJoCo's model that step effects may have changed, (N, ...)."""
+        self._batch.follow(fields)
+
+    def remember(self, memory: dict[str, Array]) -> None:
+        """Let actuators and step effects remember that."""
+        for name, values in self.memory.items():
+            values[...] = memory[name]
 
     def begin(
         self, first: int, count: int, last: int, desired: DesiredMotion, commands: Sequence[Array]
@@ -86,6 +103,7 @@ class CompiledFlight:
         its steps are flown. The flight's ``last`` period has none.
         """
         self._flown = 0  # halves of periods
+        self.stopped[:] = count
         # A vehicle's rows lie together: its thread writes them in turn.
         recorded = np.empty((len(self.physics), count, self._record_size), np.uint8)
         recorded.setflags(write=False)  # but by the compiled function
@@ -97,9 +115,15 @@ class CompiledFlight:
         draws = self._suite.draws(range(first, first + count))
         # The same for every vehicle, and of each its own.
         rows = [np.ascontiguousarray(array[:count])[:, None] for array in desired]
-        inputs = (*period.reference, *period.draws.values()), (*rows, *draws.values())
-        given: Any = () if period.has_law else period.command, commands
-        self._of_block: list[Any] = [rows, draws, commands]  # kept alive: read by their addresses
+        times = (first + np.arange(count, dtype=float)) * self._assembly.scenario.rates.control
+        known = [effect.known(times)[:, None] for effect in self._effects]
+        inputs = (
+            (*period.reference, *period.draws.values(), *period.known),
+            (*rows, *draws.values(), *known),
+        )
+        made: Any = () if period.has_law else period.command
+        given = (*made, *period.known), (*commands, *known)
+        self._of_block: list[Any] = [rows, draws, known, commands]  # kept: read by address
         for name, (targets, sources) in (("inputs", inputs), ("commands", given)):
             table = _table(map(self._input, targets, sources))
             self._of_block.append(table)
@@ -127,6 +151,14 @@ class CompiledFlight:
         self._begin[0], self._end[0] = self._flown, end
         self._apply()
         self._flown = end
+
+    @property
+    def told(self) -> int:
+        """The first period of the block in which a step effect has an event to tell.
+
+        Nothing is known of it and of what follows. As many as the block has, where there is none.
+        """
+        return int(self.stopped.min())
 
     @property
     def has_law(self) -> bool:
@@ -169,7 +201,9 @@ class CompiledFlight:
         if period.has_law:
             state, memory = groups["physics"][""], groups["memory"]
             if not self._suite.ticks:
-                truth = truth_of(state, memory, self._layout, self._assembly.actuators, ())
+                truth = truth_of(
+                    state, memory, self._layout, self._assembly.actuators, self._effects
+                )
                 reports = self._suite.report({}, truth)._asdict()
                 groups["measurement"] = {name: a for name, a in reports.items() if a.size}
             for name in ("law", "signals", "sensors"):
@@ -180,29 +214,25 @@ class CompiledFlight:
         """Return the orders with all that is the same in every block."""
         period, assembly = self._period, self._assembly
         rates, model = assembly.scenario.rates, assembly.vehicle.model
-        _, words_of = struct_offsets.find()
+        words_of_model, words_of = struct_offsets.find()
         orders = np.zeros((), ORDERS)
-        for name in ("step", "forward"):
-            orders[name] = address(f"mj_{name}")
-        orders["get_state"], orders["state"] = address("mj_getState"), int(INTEGRATION)
-        orders["steps"], orders["stepwise"] = rates.steps, assembly.driven_stepwise
+        for name, function in (
+            *(("step", "step"), ("step1", "step1"), ("forward", "forward")),
+            *(("set_const", "setConst"), ("get_state", "getState"), ("set_state", "setState")),
+        ):
+            orders[name] = address(f"mj_{function}")
+        orders["state"] = int(INTEGRATION)
+        orders["steps"], orders["driven"] = rates.steps, assembly.driven_stepwise
+        orders["prepared"] = any(effect.every_step for effect in self._effects)
         orders["control"], orders["physics"] = rates.control, rates.physics
-        sensing, driving = period.sensing, period.driving
-        shifted = driving.table.copy()
-        shifted[:, 2:] += len(sensing.words)
         drives = [kind.drives for kind in assembly.actuators.kinds]
         tables = {
             "memory": period.program.memory.view(np.int64),
-            "words": np.concatenate([sensing.words, driving.words]),
-            "relative": np.concatenate([sensing.relative, driving.relative]),
-            "sensing": sensing.table,
-            "driving": shifted,
+            **self._sections(),
             "remembered": _table(
                 (self._offset(each), place, each.nbytes)
                 for each, place in zip(remembered, places, strict=True)
             ),
-            "after_sensing": self._copies(period.after_sensing),
-            "after_driving": self._copies(period.after_driving),
             "applied": _table(
                 (
                     getattr(words_of, driven.array),
@@ -212,6 +242,8 @@ class CompiledFlight:
                 )
                 for driven, values in zip(drives, period.applied, strict=True)
             ),
+            "written": self._writes(period.written, words_of),
+            "masses": self._writes(period.masses, words_of_model),
             "before": self._record_table(period.before, self._record_places),
             "after": self._record_table(period.after, self._record_places[len(period.before) :]),
         }
@@ -227,7 +259,32 @@ class CompiledFlight:
         orders["sensors"] = self._offset(period.sensordata)
         orders["sensors_word"] = words_of.sensordata
         orders["sensors_size"] = period.sensordata.nbytes
+        for name in ("body_mass", "body_parentid", "body_subtreemass"):
+            orders[name] = getattr(words_of_model, name)
+        orders["bodies"], orders["most_constraints"] = (
+            model.nbody,
+            struct_offsets.most_constraints(),
+        )
+        orders["looks"] = any(effect.looks for effect in self._effects)
+        for name in ("looking", "sensing", "preparing"):
+            told = getattr(period, name).report
+            orders[f"told_{name}"] = (self._offset(told), told.size) if told.size else (0, 0)
+        orders["stopped"] = self.stopped.ctypes.data
         return orders
+
+    def _sections(self) -> dict[str, np.ndarray]:
+        """Return the tables of the program's sections, whose words follow one another."""
+        period, tables = self._period, dict[str, np.ndarray]()
+        words, relative, used = [], [], 0
+        for name in ("looking", "sensing", "driving", "preparing"):
+            calls, after, _ = getattr(period, name)
+            tables[name] = calls.table + np.array([0, 0, used, used, used])
+            tables[f"after_{name}"] = self._copies(after)
+            words.append(calls.words)
+            relative.append(calls.relative)
+            used += len(calls.words)
+        tables["words"], tables["relative"] = np.concatenate(words), np.concatenate(relative)
+        return tables
 
     def _input(self, to: np.ndarray, of: np.ndarray) -> tuple[int, ...]:
         """Return the row of an input of each period ``to`` the memory; (count, N or 1, ...)."""
@@ -239,6 +296,18 @@ class CompiledFlight:
 
     def _copies(self, pairs: Copies) -> np.ndarray:
         return _table((self._offset(to), self._offset(of), to.nbytes) for to, of in pairs)
+
+    def _writes(self, writes: Sequence[Write], words: Any) -> np.ndarray:
+        """Return the table of ``writes`` into a struct whose fields stand at these ``words``."""
+        return _table(
+            (
+                getattr(words, each.array),
+                _WORD * each.first,
+                self._offset(each.values),
+                each.values.nbytes,
+            )
+            for each in writes
+        )
 
     def _record_table(self, recorded: Sequence[Recorded], places: Sequence[int]) -> np.ndarray:
         return _table(

@@ -8,7 +8,7 @@ import ctypes
 import functools
 import sys
 import weakref
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -68,9 +68,17 @@ class NativeBatch:
     """
 
     def __init__(
-        self, model: Any, vehicles: int, threads: int, fields: Mapping[str, Array]
+        self,
+        model: Any,
+        vehicles: int,
+        threads: int,
+        fields: Mapping[str, Array],
+        own: Collection[str] = (),
     ) -> None:
         """Make it; ``fields`` of the model differ between vehicles, (N, ...).
+
+        Each thread has its ``own`` copy of other fields, and of all that MuJoCo derives from them:
+        a function that is applied may change both, and finds the fields anew at each vehicle.
 
         Raises:
             ValueError: MuJoCo cannot make it.
@@ -93,10 +101,28 @@ class NativeBatch:
         self.state = self._array(rows, ctypes.c_double, (vehicles, size))
         counters = (vehicles, int(mujoco.mjtWarning.mjNWARNING), 2)
         self.warning = self._array(library().mjb_warning(self._batch), ctypes.c_int, counters)
+        for name in own:
+            library().mjb_expand(self._batch, name.encode(), None, None)
+        if own:
+            self._check(library().mjb_setConst(self._batch, None, 0))
+        self._fields: dict[str, Array] = {}
+        self.follow(fields)
+
+    def follow(self, fields: Mapping[str, Array]) -> None:
+        """Let those fields of the model be the vehicles' own, (N, ...), with all that derives.
+
+        Raises:
+            mujoco.batch.SimulationError: MuJoCo raised an error.
+        """
+        changed = False
         for name, values in fields.items():
-            at = library().mjb_expand(self._batch, name.encode(), None, None)
-            self._array(at, ctypes.c_double, values.shape)[...] = values
-        if fields:
+            if name not in self._fields:
+                at = library().mjb_expand(self._batch, name.encode(), None, None)
+                self._fields[name] = self._array(at, ctypes.c_double, values.shape)
+                changed = True
+            changed |= not np.array_equal(self._fields[name], values)
+            self._fields[name][...] = values
+        if changed:
             self._check(library().mjb_setConst(self._batch, None, 0))
 
     def apply(self, function: int, argument: int) -> None:

@@ -13,7 +13,7 @@ from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
-from mjspace.vehicle.step_effect import StepEffect
+from mjspace.vehicle.step_effect import State, StepEffect
 
 Rows = dict[str, dict[str, Array]]
 
@@ -142,6 +142,12 @@ class Recording:
                 column[row] = source[key]
         self._events += period.events
         self._rows += 1
+
+    def sensors_before(self, number: int, now: State) -> State:
+        """Return what the sensors remembered before that period; ``now`` if it is not recorded."""
+        if number >= self._rows:
+            return now
+        return {name: column[number].copy() for name, column in self._columns["sensors"].items()}
 
     def columns(self, count: int | None = None) -> Columns:
         """Return what has been recorded, of the first ``count`` periods or of all, as views."""

@@ -3,22 +3,18 @@
 import dataclasses
 import re
 import warnings
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
+from compiled_flights import assembly, assert_same, flown, one_of
 from mujoco.batch import SimulationError
 
-from mjspace.contract import Event
-from mjspace.errors import FlightError
-from mjspace.scenario.loading import load
-from mjspace.simulation import compiled_blocks, loop
-from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation import loop
+from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.initial_state import Start, first_start
-from mjspace.simulation.loop import fly
 from mjspace.simulation.stepper import Stepper
 from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
@@ -27,78 +23,10 @@ pytestmark = pytest.mark.filterwarnings(
 )
 
 
-class Flown(NamedTuple):
-    """A flight: rows by topic and field, events, what ended it, and what was compiled."""
-
-    rows: dict[str, np.ndarray]
-    events: list[Event]
-    trouble: str
-    compiled: str
-
-    def bits(self, vehicle: Any = slice(None)) -> dict[str, bytes]:
-        fields = {name: values for name, values in self.rows.items() if name != "time"}
-        return {name: values[:, vehicle].tobytes() for name, values in fields.items()}
-
-    @property
-    def told(self) -> list[Event]:
-        """The events in order of time, vehicle and text, as no block cuts them."""
-        return sorted(self.events)
-
-
 @pytest.fixture(autouse=True)
 def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(loop, "BLOCK_PERIODS", 40)
     monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
-
-
-def assembly(name: str, *overrides: str, folder: Path | None = None) -> Assembly:
-    scenario, beside = load(name, ["checks=[]", *overrides])
-    return assemble(scenario, folder or beside)
-
-
-def flown(
-    built: Assembly,
-    members: Sequence[int] = (0,),
-    *,
-    compiled: bool = True,
-    start: Start | None = None,
-    threads: int = 1,
-    stop: Callable[[], bool] = lambda: False,
-) -> Flown:
-    made: list[Any] = []
-    initialize = compiled_blocks.CompiledBlocks.__init__
-
-    def initialized(self: Any, *arguments: Any) -> None:
-        initialize(self, *arguments)
-        self.on = self.on and compiled
-        made.append(self)
-
-    blocks, trouble = [], ""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compiled_blocks.CompiledBlocks, "__init__", initialized)
-        try:
-            for block in fly(
-                built, start or first_start(built, members), members, threads=threads, stop=stop
-            ):
-                blocks.append(block)
-        except FlightError as error:
-            trouble = str(error)
-    rows = {
-        f"{topic}.{field}": np.concatenate([block.rows[topic][field] for block in blocks])
-        for topic, fields in blocks[0].rows.items()
-        for field in fields
-    }
-    rows["time"] = np.concatenate([block.time for block in blocks])[:, None]
-    return Flown(rows, [e for block in blocks for e in block.events], trouble, str(made[0]))
-
-
-def assert_same(one: Flown, other: Flown) -> None:
-    assert one.rows.keys() == other.rows.keys()
-    for name, values in one.rows.items():
-        assert values.shape == other.rows[name].shape, name
-        assert values.tobytes() == other.rows[name].tobytes(), name
-    assert one.told == other.told
-    assert one.trouble == other.trouble
 
 
 WHOLE = "compiled: sensors, law and actuators"
@@ -209,7 +137,7 @@ def test_vehicles_are_alike_alone_and_together_at_any_number_of_threads(name: st
         together = flown(built, members, start=start, threads=threads)
         assert together.compiled == WHOLE
         assert_same(together, python)
-    alone = flown(built, [2], start=_of(start, 2))
+    alone = flown(built, [2], start=one_of(start, 2))
     assert alone.bits(0) == python.bits(2)
     assert python.bits(1) != python.bits(2)
 
@@ -234,20 +162,6 @@ def test_sensors_with_errors_are_compiled_and_err_in_each_vehicle_by_itself() ->
         assert alone.compiled == WHOLE
         assert alone.bits(0) == python.bits(member)
     assert python.bits(1) != python.bits(2)
-
-
-def _of(start: Start, vehicle: int) -> Start:
-    """Return one vehicle's part of a start."""
-
-    def part(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        return {name: values[vehicle : vehicle + 1] for name, values in arrays.items()}
-
-    return dataclasses.replace(
-        start,
-        physics=start.physics[vehicle : vehicle + 1],
-        sensors=part(start.sensors),
-        actuators=part(start.actuators),
-    )
 
 
 @pytest.mark.parametrize("name", ["contraction-adaptive", "dgvscmg-tracking"])
