@@ -70,7 +70,7 @@ class CompiledFlight:
         self.stopped = np.zeros(vehicles, np.int64)
         self._tables: list[np.ndarray] = []
         self._orders = self._constant_orders(remembered, places)
-        self._halves = _halves_of(self._orders)
+        self._begin, self._end = (self._orders[name].reshape(1) for name in ("begin", "end"))
         self._apply = partial(self._batch.apply, block_function().address, self._orders.ctypes.data)
 
     def set(
@@ -104,8 +104,10 @@ class CompiledFlight:
         """
         self._flown = 0  # halves of periods
         self.stopped[:] = count
-        self._recorded = np.empty((count, len(self.physics), self._record_size), np.uint8)
-        self._recorded.setflags(write=False)  # but by the compiled function
+        # A vehicle's rows lie together: its thread writes them in turn.
+        recorded = np.empty((len(self.physics), count, self._record_size), np.uint8)
+        recorded.setflags(write=False)  # but by the compiled function
+        self._recorded = recorded.transpose(1, 0, 2)
         period, orders = self._period, self._orders
         orders["first"], orders["last"] = first, last
         orders["record"] = self._recorded.ctypes.data
@@ -121,10 +123,10 @@ class CompiledFlight:
         )
         made: Any = () if period.has_law else period.command
         given = (*made, *period.known), (*commands, *known)
-        self._of_block: tuple[Any, ...] = rows, draws, known, commands  # kept: read by address
+        self._of_block: list[Any] = [rows, draws, known, commands]  # kept: read by address
         for name, (targets, sources) in (("inputs", inputs), ("commands", given)):
             table = _table(map(self._input, targets, sources))
-            self._of_block += (table,)
+            self._of_block.append(table)
             orders[name] = table.ctypes.data, len(table)
 
     def fly_to_instant(self, period: int) -> None:
@@ -146,7 +148,7 @@ class CompiledFlight:
         self._fly_halves(2 * count)
 
     def _fly_halves(self, end: int) -> None:
-        self._halves[0], self._halves[1] = self._flown, end
+        self._begin[0], self._end[0] = self._flown, end
         self._apply()
         self._flown = end
 
@@ -327,12 +329,6 @@ def _view(rows: np.ndarray, place: int, array: np.ndarray) -> Any:
     """Return the values like one vehicle's ``array`` (1, ...) at that place in the ``rows``."""
     part = rows[..., place : place + array.nbytes]
     return part.view(array.dtype).reshape(*rows.shape[:-1], *array.shape[1:])
-
-
-def _halves_of(orders: np.ndarray) -> np.ndarray:
-    """Return what begins with ``begin`` and ``end`` of the orders: a view that is quick to set."""
-    place = ORDERS.fields["begin"][1] // _WORD
-    return orders.reshape(1).view(np.int64)[place : place + 2]
 
 
 def _table(rows: Iterable[tuple[int, ...]]) -> np.ndarray:

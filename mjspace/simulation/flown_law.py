@@ -32,6 +32,7 @@ class FlownLaw:
     def __init__(self, law: Law, state: Any, vehicles: int) -> None:
         """Fly ``law`` on so many vehicles, from its ``state``; None: it is reset at the start."""
         self._law: Any = law
+        self._own: Any = law.law if isinstance(law, UnbatchedLaw) else law
         self.state = state
         self._vehicles = vehicles
         self._first: Any = None
@@ -60,7 +61,7 @@ class FlownLaw:
     @property
     def one_by_one(self) -> bool:
         """Whether the law is called for each vehicle by itself."""
-        return isinstance(self._law, UnbatchedLaw)
+        return self._own is not self._law
 
     def call(
         self, state: Any, time: float, measurement: Measurement, reference: DesiredMotion
@@ -70,8 +71,7 @@ class FlownLaw:
         Raises:
             FlightError: it raised.
         """
-        law = self._law.law if self.one_by_one else self._law
-        return _called(law.step, state, time, measurement, reference)
+        return _called(self._own.step, state, time, measurement, reference)
 
     def arrays_of(self, returned: Any, check: Callable[[Any], None]) -> list[Array]:
         """Return the arrays of what ``call`` returned, in a period after the first.

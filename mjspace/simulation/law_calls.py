@@ -1,6 +1,7 @@
 """A law that Python calls in each period of a block, between parts that are compiled."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -60,7 +61,7 @@ class LawCalls:
 
     def of_each(self, measurement: Measurement) -> list[Measurement]:
         """Return what each call measures of all vehicles' ``measurement``."""
-        return [measurement._map(lambda array, cut=cut: array[None][cut][0]) for cut in self._cuts]
+        return [measurement._map(partial(_cut, cut)) for cut in self._cuts]
 
     def measurements(self, measured: Mapping[str, Array]) -> Iterator[tuple[Measurement, ...]]:
         """Return what each call measures in each period after the first.
@@ -150,6 +151,11 @@ def _rows(
         yield first._replace(**dict(zip(names, row, strict=True)))
 
 
+def _cut(cut: Any, array: Array) -> Array:
+    """Return the part of a column's row that one call receives."""
+    return array[None][cut][0]  # type: ignore[no-any-return]
+
+
 def _read_only(column: Array) -> Array:
     """Return the ``column`` as an array that cannot be made writable."""
-    return np.asarray(memoryview(column).toreadonly())
+    return np.asarray(column.data.toreadonly())

@@ -95,6 +95,7 @@ class NativeBatch:
         self._memory = _Memory()
         weakref.finalize(self._memory, library().mjb_deleteBatch, self._batch)
         self.vehicles = vehicles
+        self._apply = library().mjb_apply  # called in every period of a law in Python
         size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
         rows = library().mjb_state(self._batch)
         self.state = self._array(rows, ctypes.c_double, (vehicles, size))
@@ -130,7 +131,9 @@ class NativeBatch:
         Raises:
             mujoco.batch.SimulationError: MuJoCo raised an error in some simulations.
         """
-        self._check(library().mjb_apply(self._batch, None, 0, function, argument, 1))
+        failed = self._apply(self._batch, None, 0, function, argument, 1)
+        if failed:
+            self._check(failed)
 
     def _check(self, failed: int) -> None:
         if failed:

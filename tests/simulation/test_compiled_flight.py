@@ -276,6 +276,126 @@ def test_a_law_that_cannot_be_compiled_is_called_in_python(
     assert_same(mixed, python)
 
 
+@pytest.mark.parametrize(
+    "result",
+    [
+        "signals = Signals(signals.error, float(size))",  # a Python number
+        "torque = torque.tolist() if time > 0.05 else torque",
+        "torque = torque.astype(np.float32) if time > 0.05 else torque",
+        "slowed = float(slowed)",
+    ],
+)
+def test_what_a_called_law_returns_may_be_any_numbers(result: str, tmp_path: Path) -> None:
+    built = own_law(tmp_path)
+    source = HEAD.replace("{trouble}", "assert time >= 0.0")
+    place = "        return State(integral, slowed), TorqueCommand"
+    (tmp_path / "own.py").write_text(source.replace(place, f"        {result}\n{place}"))
+    built = assembly(
+        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
+    )
+    called, python = flown(built, (0, 1), threads=2), flown(built, (0, 1), compiled=False)
+    assert "law called in Python" in called.compiled
+    assert_same(called, python)
+
+
+@pytest.mark.parametrize("batched", [False, True])
+def test_a_called_law_of_many_vehicles_is_pythons(batched: bool, tmp_path: Path) -> None:
+    source = BATCHED.replace('torque.astype(str) + "?"', "0.5 * torque")
+    if not batched:
+        source = source.replace("batched = True", "batched = False")
+    (tmp_path / "own.py").write_text(source)
+    law = "law={kind='own.py:Law'}"
+    built = assembly("contraction-noise", "duration=0.1", law, *ERRORS, folder=tmp_path)
+    members = (0, 1, 2)
+    python = flown(built, members, compiled=False)
+    for threads in (1, 2):
+        called = flown(built, members, threads=threads)
+        assert called.compiled.startswith("sensors and actuators compiled; law called")
+        assert_same(called, python)
+    assert flown(built, [2]).bits(0) == python.bits(2)
+
+
+KEEPING = """
+from typing import NamedTuple
+import numpy as np
+from mjspace.contract import TorqueCommand
+
+class State(NamedTuple):
+    sum: np.ndarray
+
+class Law:
+    compiled = False
+
+    def __init__(self):
+        self.seen, self.torque = [], np.zeros(3)
+
+    def reset(self, measurement, reference):
+        return State(np.zeros(3))
+
+    def step(self, state, time, measurement, reference):
+        for array in (measurement.rate, state.sum, reference.attitude):
+            assert not array.flags.writeable
+            try:
+                array.setflags(write=True)
+            except ValueError:
+                continue
+            raise AssertionError("made writable")
+        self.seen.append((measurement, state, reference))
+        self.torque[:] = -5.0 * measurement.rate
+        return State(state.sum + measurement.rate), TorqueCommand(self.torque), None
+"""
+
+
+def test_what_a_called_law_keeps_does_not_change_and_its_own_arrays_are_copied(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "own.py").write_text(KEEPING)
+    built = assembly(
+        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
+    )
+    rows, law = flown(built).rows, getattr(built.law, "law")  # noqa: B009 - the user's own
+    assert len(rows["/truth.rate"]) == 101
+    np.testing.assert_array_equal(
+        [seen[0].rate for seen in law.seen], rows["/measurement.rate"][:, 0]
+    )
+    np.testing.assert_array_equal([seen[1].sum for seen in law.seen], rows["/state.law_sum"][:, 0])
+    np.testing.assert_array_equal(
+        [seen[2].attitude for seen in law.seen], rows["/reference.attitude"][:, 0]
+    )
+    np.testing.assert_array_equal(rows["/command.torque"], -5.0 * rows["/measurement.rate"])
+
+
+def test_a_called_law_divides_by_zero_without_warnings(tmp_path: Path) -> None:
+    built = own_law(tmp_path, "assert time >= 0.0; size = size / np.zeros(())")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        called = flown(built)
+    assert ("law called in Python" in called.compiled, called.trouble) == (True, "")
+
+
+def test_a_called_laws_change_of_shape_ends_the_flight_as_in_python(tmp_path: Path) -> None:
+    # To a shape that would be broadcast to the one before.
+    built = own_law(tmp_path, "error = error if time < 0.0605 else error[:1]")
+    source = (tmp_path / "own.py").read_text()
+    (tmp_path / "own.py").write_text(source.replace("np.concatenate([error, size[None]])", "error"))
+    built = assembly(
+        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
+    )
+    called, python = flown(built), flown(built, compiled=False)
+    assert "has the shape (1, 1) after (1, 3): shapes must not change" in called.trouble
+    assert_same(called, python)
+
+
+def test_actuators_under_a_called_law_have_the_motion_of_now(tmp_path: Path) -> None:
+    # Wheels at their speed limit cut the command by how fast they turn.
+    limit = "plant.wheels.speed_limit=30"
+    built = own_law(tmp_path, "torque *= -3.0 if time > 0.0 else 1.0", 0.4, limit)
+    called, python = flown(built), flown(built, compiled=False)
+    assert "law called in Python" in called.compiled
+    assert any("saturated" in event.message for event in python.events)
+    assert_same(called, python)
+
+
 def test_a_law_with_dice_is_noticed_and_flown_in_python(tmp_path: Path) -> None:
     # A generator's state is nowhere to be seen, but the first period shows it.
     trouble = "torque = torque + self.noise.normal(size=3)"
