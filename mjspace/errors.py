@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from mjspace.plain_text import printable
+
 _TESTBED = Path(__file__).parent
 
 
@@ -56,7 +58,7 @@ def nearest(name: str, names: Any) -> str:
 
 def print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Print a warning as one line, in place of ``warnings.showwarning``."""
-    print(f"mjspace: warning: {message}", file=sys.stderr)
+    print(f"mjspace: warning: {printable(str(message))}", file=sys.stderr)
 
 
 def place_of(error: Exception) -> str:

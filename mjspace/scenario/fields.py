@@ -17,6 +17,7 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
+from mjspace.plain_text import is_file_name, shortened
 from mjspace.ranges import FORMS, Form
 from mjspace.units import Unit, quantity, to_si
 
@@ -80,12 +81,19 @@ def of_form(form: Form) -> AfterValidator:
     return AfterValidator(validated)
 
 
+def _file_name(name: str) -> str:
+    if not is_file_name(name):
+        raise ValueError(f"got {shortened(name)!r}, should be a name that a folder can have")
+    return name
+
+
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
 Switch = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+FileName = Annotated[str, AfterValidator(_file_name)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
 Seconds = Annotated[Positive, Si("s")]

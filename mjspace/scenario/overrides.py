@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from mjspace.errors import InputError
+from mjspace.plain_text import is_plain
+from mjspace.scenario import raw
 
 _COMPONENTS = ("law", "reference")
 
@@ -34,10 +36,16 @@ def _parsed(override: str, option: str) -> tuple[str, str, Any]:
     key = key.strip()
     if not equals or not key:
         raise InputError(f"{option} {override}: write key=value")
+    if not is_plain(override):
+        raise InputError(f"{option} {override}: control characters")
+    if key.count(".") >= raw.DEEPEST:
+        raise InputError(f"{option} {override}: the key has too many parts")
     try:
-        return override, key, tomllib.loads(f"value = {text}")["value"]
+        return override, key, raw.parsed(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return override, key, text.strip()
+    except ValueError as error:
+        raise InputError(f"{option} {override}: {error}") from None
 
 
 def _turn(key: str) -> tuple[bool, int]:

@@ -50,7 +50,8 @@ def compose(table: PlantTable) -> Any:
 def part_names() -> list[str]:
     """Return the names of the parts to bolt to a bus: those with something that moves."""
     found = {path.parent.name: path for path in ASSETS.glob("parts/*/*.xml")}
-    return sorted(name for name, path in found.items() if "<joint " in path.read_text())
+    texts = {name: path.read_text(encoding="utf-8") for name, path in found.items()}
+    return sorted(name for name, text in texts.items() if "<joint " in text)
 
 
 def _load(name: str) -> Any:
