@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args, get_origin
 import numpy as np
 
 from mjspace.errors import nearest
+from mjspace.plain_text import shortened
 from mjspace.ranges import numbers, refuse_unfit
 from mjspace.scenario.gain_tables import columns
 from mjspace.scenario.scenario import Component
@@ -32,7 +33,10 @@ def construct(
     """
     gains = component.gains
     if "file" in gains:
-        read = columns(trust.file(str(gains.pop("file"))))
+        file = gains.pop("file")
+        if not isinstance(file, str):
+            raise ValueError(f"file: got {shortened(repr(file))}, should be text")
+        read = columns(trust.file(file))
         if both := sorted(read.keys() & gains.keys()):
             raise ValueError(f"{both[0]}: stands both here and in the file: leave one out")
         gains |= read

@@ -14,11 +14,14 @@ from pydantic import (
     GetJsonSchemaHandler,
     ValidationError,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
 )
 from pydantic_core import core_schema
 
 from mjspace.plain_text import is_file_name, shortened
 from mjspace.ranges import FORMS, Form
+from mjspace.scenario.trust import CommandLineText
 from mjspace.units import Unit, quantity, to_si
 
 _IN_PEOPLES_UNITS = {"rad": "deg", "rad/s": "deg/s", "m": "km", "s": "min"}
@@ -87,12 +90,18 @@ def _file_name(name: str) -> str:
     return name
 
 
+def _marked(name: Any, inner: ValidatorFunctionWrapHandler) -> Any:
+    return name if isinstance(name, CommandLineText) else inner(name)
+
+
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
 Switch = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+KindName = Annotated[str, WrapValidator(_marked)]
+"""What names code. It stays marked as text of the command line."""
 FileName = Annotated[str, AfterValidator(_file_name)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 

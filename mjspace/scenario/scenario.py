@@ -18,7 +18,7 @@ from mjspace.contract import TICK
 from mjspace.ranges import numbers
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Count, FileName, Seconds, Switch, Table, Time
+from mjspace.scenario.fields import Count, FileName, KindName, Seconds, Switch, Table, Time
 from mjspace.scenario.log_rates import LogRates
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
@@ -31,7 +31,7 @@ class Component(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    kind: str
+    kind: KindName
     """``"module:Class"`` in controllers/, or ``"file.py:Class"`` in the scenario's folder."""
 
     @property

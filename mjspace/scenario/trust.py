@@ -17,12 +17,17 @@ GROUP = "mjspace.controllers"
 """The package of the laws that come with mjspace, and the entry points of those that do not."""
 
 
+class CommandLineText(str):
+    """Text that the user gave by ``--set`` or ``--gain``: what it names is trusted."""
+
+
 @dataclass(frozen=True)
 class Trust:
     """What code and files a scenario may name, and where they are looked up.
 
     That is code which comes with mjspace or which an installed package offers as an entry point of
-    the group ``mjspace.controllers``, and files in the scenario's own folder.
+    the group ``mjspace.controllers``, and files in the scenario's own folder; and whatever the user
+    named on the command line.
     """
 
     folder: Path
@@ -37,7 +42,7 @@ class Trust:
             ValueError: it is outside the folder, and the scenario is not trusted.
         """
         path = self.folder / name
-        if not (self.everything or path.resolve().is_relative_to(self.folder.resolve())):
+        if not (self._trusts(name) or path.resolve().is_relative_to(self.folder.resolve())):
             raise ValueError(f"{name} is outside the scenario's folder: --trust allows that")
         return path
 
@@ -50,6 +55,7 @@ class Trust:
         place, _, name = kind.partition(":")
         if not place or not name:
             raise ValueError(f"{kind!r}: write 'module:Class' or 'file.py:Class'")
+        place = type(kind)(place)  # partition makes a plain text of any
         own_file = place.endswith(".py")
         module = load_file(self.file(place)) if own_file else self._import(place)
         names = {
@@ -79,15 +85,18 @@ class Trust:
                 raise ValueError(f"{kind} has no method {method}")
         return found
 
+    def _trusts(self, name: str) -> bool:
+        return self.everything or isinstance(name, CommandLineText)
+
     def _import(self, name: str) -> ModuleType:
         have = controllers()
-        full = have.get(name.removeprefix(f"{GROUP}."))
-        full = full or _entry_points().get(name) or (name if self.everything else None)
+        full: str | None = have.get(name.removeprefix(f"{GROUP}."))
+        full = full or _entry_points().get(name) or (name if self._trusts(name) else None)
         try:
             if full is not None:
                 return importlib.import_module(full)
         except ModuleNotFoundError as error:
-            if error.name is None or not full.startswith(error.name):
+            if error.name is None or not f"{full}".startswith(error.name):
                 raise ValueError(f"{name!r} cannot be imported: {error}") from error
         raise ValueError(
             f"no module {name!r} in {GROUP}{nearest(name, sorted(have))}; a file of your own is "

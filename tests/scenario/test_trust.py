@@ -10,6 +10,7 @@ import pytest
 
 import mjspace
 from mjspace.errors import InputError
+from mjspace.scenario.loading import load
 from mjspace.scenario.trust import Trust
 from mjspace.simulation.assembly import METHODS
 
@@ -21,17 +22,55 @@ class Law:
 """
 
 
+TABLES = {
+    "law": '[law]\nkind = "{}"\n',
+    "reference": '[reference]\nkind = "{}"\n',
+    "disturbance": '[environment]\npython = "{}"\n',
+    "inner": '[law]\nkind = "phases:Phases"\n[[law.phases]]\nname = "a"\nlaw = {{ kind = "{}" }}\n',
+}
+
+
+def scenario(folder: Path, table: str) -> Path:
+    path = folder / "x.toml"
+    path.write_text(f'base = "detumble-wheels"\nchecks = []\nduration = "0.1 s"\n{table}')
+    return path
+
+
 @pytest.mark.parametrize("kind", ["os:system", "subprocess:Popen", "antigravity:fly"])
-@pytest.mark.parametrize("key", ["law.kind", "reference.kind", "environment.python"])
+@pytest.mark.parametrize("table", TABLES)
 def test_a_module_that_no_package_offers_is_not_imported(
-    tmp_path: Path, key: str, kind: str
+    tmp_path: Path, table: str, kind: str
 ) -> None:
     with pytest.raises(InputError, match=rf"no module '{kind.partition(':')[0]}' in mjspace"):
-        mjspace.run(
-            "detumble-wheels", overrides=[f"{key}={kind}", "duration=0.1"], out=tmp_path / "out"
-        )
+        mjspace.run(scenario(tmp_path, TABLES[table].format(kind)), out=tmp_path / "out")
     assert "antigravity" not in sys.modules
     assert not (tmp_path / "out").exists()
+
+
+def test_what_the_user_typed_is_trusted(tmp_path: Path) -> None:
+    """A file anywhere and any module; yet no function is a law."""
+    (tmp_path / "law.py").write_text(LAW)
+    (tmp_path / "mine").mkdir()
+    kinds = [
+        f"law.kind={tmp_path}/law.py:Law",
+        "law.kind='../law.py:Law'",
+        "law={kind='../law.py:Law'}",
+    ]
+    for override in kinds:
+        loaded, folder = load(scenario(tmp_path / "mine", ""), [override])
+        assert Trust(folder).load_class(loaded.law.kind, METHODS["law"]).__name__ == "Law"
+    loaded, folder = load("detumble-wheels", ["law.kind=os:system"])
+    with pytest.raises(ValueError, match="'os' has no 'system'"):
+        Trust(folder).load(loaded.law.kind)
+    disturbance = f"environment.python={tmp_path}/law.py:Law"
+    loaded, folder = load("detumble-wheels", [disturbance])
+    assert Trust(folder).load(loaded.environment.python)
+    table = tmp_path / "table.csv"
+    table.write_text("time,attitude0,attitude1,attitude2,attitude3\n0,1,0,0,0\n1,1,0,0,0\n")
+    overrides = ["reference.kind=tabulated:Table", f"reference.file={table}"]
+    assert mjspace.run(
+        scenario(tmp_path / "mine", ""), overrides=overrides, out=tmp_path / "out"
+    ).passed
 
 
 @pytest.mark.parametrize("name", ["np", "Array", "dataclass", "nothing"])
@@ -49,9 +88,8 @@ def test_a_class_is_looked_at_before_it_is_constructed(tmp_path: Path) -> None:
     trust = Trust(tmp_path)
     with pytest.raises(ValueError, match=r"own\.py:Bomb has no method reset\(measurement"):
         trust.load_class("own.py:Bomb", METHODS["law"])
-    (tmp_path / "x.toml").write_text('base = "detumble-wheels"\n[law]\nkind = "own.py:Bomb"\n')
     with pytest.raises(InputError, match=r"law: own\.py:Bomb has no method"):
-        mjspace.run(tmp_path / "x.toml", out=tmp_path / "out")
+        mjspace.run(scenario(tmp_path, '[law]\nkind = "own.py:Bomb"\n'), out=tmp_path / "out")
     assert not made.exists()
 
 
@@ -84,13 +122,9 @@ def test_a_link_out_of_the_folder_does_not_help(tmp_path: Path) -> None:
 def test_a_table_file_stays_in_the_folder(tmp_path: Path) -> None:
     (tmp_path / "secret").write_text("top secret\n")
     (tmp_path / "mine").mkdir()
-    path = tmp_path / "mine/x.toml"
-    text = 'base = "detumble-wheels"\n[reference]\nkind = "tabulated:Table"\nfile = "../secret"\n'
-    path.write_text(text)
-    with pytest.raises(
-        InputError, match=r"\.\./secret is outside the scenario's folder"
-    ) as refused:
-        mjspace.run(path, out=tmp_path / "out")
+    table = '[reference]\nkind = "tabulated:Table"\nfile = "../secret"\n'
+    with pytest.raises(InputError, match=r"secret is outside the scenario's folder") as refused:
+        mjspace.run(scenario(tmp_path / "mine", table), out=tmp_path / "out")
     assert "top" not in str(refused.value)
 
 
