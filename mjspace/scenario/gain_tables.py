@@ -24,8 +24,8 @@ def columns(path: Path) -> dict[str, Any]:
     names = [name.strip() for name in lines[0].lstrip("# ").split(",")] if lines else []
     if not names or not all(name.isidentifier() for name in names):
         raise ValueError(
-            f"file: {path}, line 1: got {shortened(', '.join(names))!r}, should be a header of the gains' "
-            "names, as in time,attitude0,attitude1,attitude2,attitude3"
+            f"file: {path}, line 1: got {shortened(', '.join(names))!r}, should be a header of the "
+            "gains' names, as in time,attitude0,attitude1,attitude2,attitude3"
         )
     rows = []
     for number, line in enumerate(lines[1:], start=2):
