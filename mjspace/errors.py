@@ -38,6 +38,24 @@ def input_error_at(key: str) -> Iterator[None]:
         raise InputError(message if named else f"{key}: {message}") from error
 
 
+@contextmanager
+def whole_or_none(path: Path) -> Iterator[None]:
+    """Remove the file that the block began and could not write to its end; name it in an OSError.
+
+    What could not even be opened is left as it is.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None:
+            path.unlink(missing_ok=True)
+            error.filename = str(path)
+        raise
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
+
+
 def failure(who: str, error: Exception) -> FlightError:
     """Return the error that says what ``who`` raised, and at which line of the user's code.
 

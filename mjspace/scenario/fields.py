@@ -106,6 +106,8 @@ FileName = Annotated[str, AfterValidator(_file_name)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
 Seconds = Annotated[Positive, Si("s")]
+Period = Annotated[Positive, Field(ge=1e-9), Si("s")]
+"""From one instant to another: a log's clock has nanoseconds, in 64 bits."""
 Time = Annotated[NonNegative, Si("s")]
 Angle = Annotated[Finite, Si("rad")]
 TWO_TURNS = Field(ge=-2.0 * math.pi, le=2.0 * math.pi)

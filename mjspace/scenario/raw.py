@@ -4,6 +4,7 @@ import tomllib
 from typing import Any
 
 from mjspace.plain_text import is_plain, shortened
+from mjspace.units import is_out_of_scale
 
 DEEPEST = 20
 """Tables and lists within each other."""
@@ -13,8 +14,8 @@ def parsed(text: str) -> dict[str, Any]:
     """Return the table that a TOML text holds.
 
     Raises:
-        ValueError: it is no TOML, or its tables are nested too deeply, a number has too many
-            digits, or a text has control characters.
+        ValueError: it is no TOML, or its tables are nested too deeply, a number is out of all
+            proportion, or a text has control characters.
     """
     try:
         table = tomllib.loads(text)
@@ -51,3 +52,5 @@ def refuse_unfit(table: dict[str, Any]) -> None:
             raise ValueError(f"{key}: got {shortened(value)!r}: control characters in a text")
         elif isinstance(value, int) and abs(value) >= 2**63:
             raise ValueError(f"{key}: a whole number of more than 64 bits")
+        elif isinstance(value, float) and is_out_of_scale(value):
+            raise ValueError(f"{key}: got {value:g}: its size is not from 1e-100 to 1e100")

@@ -18,7 +18,7 @@ from mjspace.contract import TICK
 from mjspace.ranges import numbers
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Count, FileName, KindName, Seconds, Switch, Table, Time
+from mjspace.scenario.fields import Count, FileName, KindName, Positive, Si, Switch, Table, Time
 from mjspace.scenario.log_rates import LogRates
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
@@ -158,7 +158,7 @@ class Scenario(Table):
     """Where its numbers come from."""
     seed: Count = 0
     """Of every random stream."""
-    duration: Seconds
+    duration: Annotated[Positive, Field(le=9e9), Si("s")]
     """Simulated time."""
     rates: Rates = Rates()
     plant: PlantTable = Field(default_factory=PlantTable)

@@ -55,11 +55,10 @@ def part_names() -> list[str]:
 
 
 def _load(name: str) -> Any:
-    scene = ASSETS / name / "scene.xml"
-    if not scene.is_file():
-        known = ", ".join(sorted(path.parent.name for path in ASSETS.glob("*/scene.xml")))
-        raise ValueError(f"plant.model: no model {name!r}: have {known}")
-    return mujoco.MjSpec.from_file(str(scene))
+    known = {path.parent.name: path for path in sorted(ASSETS.glob("*/scene.xml"))}
+    if name not in known:
+        raise ValueError(f"plant.model: no model {name!r}: have {', '.join(known)}")
+    return mujoco.MjSpec.from_file(str(known[name]))
 
 
 def _attach_part(spec: Any, name: str, part: Part) -> None:
