@@ -200,13 +200,12 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
             raised, with the line of the user's code.
     """
     period = assembly.scenario.rates.control
+    if not log.start - 0.5 * period <= time <= log.end + 0.5 * period:
+        raise InputError(f"t = {time:g} s is not in the log: it has {log.start:g} to {log.end:g} s")
     number = round(time / period)
     near = (number - 0.5) * period, (number + 0.5) * period
     row = log.read("/state", None, *near)
     if len(row["time"]) != 1:
-        if not log.start <= time <= log.end:
-            has = f"{log.start:g} to {log.end:g} s"
-            raise InputError(f"t = {time:g} s is not in the log: it has {has}")
         found = float(log.nearest("/state", time)["time"])
         raise InputError(
             f"t = {time:g} s has no logged state: /state is logged every "
