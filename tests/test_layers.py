@@ -23,8 +23,7 @@ A_LAW_MAY_IMPORT = (
 # here by a line above its own. A room is a package or a single module of mjspace.
 ROOMS = {
     "constants": "",
-    "plain_text": "",
-    "errors": "plain_text",
+    "errors": "",
     "gufunc": "",
     "ranges": "",
     "units": "",
@@ -32,7 +31,7 @@ ROOMS = {
     "contract": "ranges units",
     "attitude": "contract",
     "signals": "contract errors",
-    "scenario": "contract errors plain_text ranges units",
+    "scenario": "contract errors ranges units",
     "tracing": "gufunc",
     "vehicle": "contract errors scenario",
     "environment": "constants contract scenario vehicle",
@@ -46,9 +45,9 @@ ROOMS = {
     "simulation": (
         "actuators attitude contract environment errors scenario sensors signals tracing vehicle"
     ),
-    "runner": "contract errors log plain_text scenario signals simulation units vehicle",
+    "runner": "contract errors log scenario signals simulation units vehicle",
     "dm_env": "attitude contract environment errors scenario simulation",
-    "terminal": "errors log plain_text",
+    "terminal": "errors log",
     "validation": "attitude constants contract environment log plotting runner scenario vehicle",
     "cli": "errors plotting rendering runner scenario simulation terminal validation",
     "__main__": "cli",

@@ -6,9 +6,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from mjspace.errors import printable
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
-from mjspace.plain_text import printable
 from mjspace.runner.checks import Verdict
 from mjspace.runner.logged_code import code_of, digest
 from mjspace.runner.run import Result

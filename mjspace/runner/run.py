@@ -6,9 +6,8 @@ from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
 
-from mjspace.errors import FlightError, InputError
+from mjspace.errors import FlightError, InputError, is_file_name, shortened
 from mjspace.log.reader import Log
-from mjspace.plain_text import is_file_name, shortened
 from mjspace.runner.checks import Verdict, refuse_other_dimensions, refuse_unknown
 from mjspace.runner.flight_log import units_of
 from mjspace.runner.interrupts import on_signals

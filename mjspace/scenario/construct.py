@@ -8,8 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
-from mjspace.errors import nearest
-from mjspace.plain_text import shortened
+from mjspace.errors import nearest, shortened
 from mjspace.ranges import numbers, refuse_unfit
 from mjspace.scenario.gain_tables import columns
 from mjspace.scenario.scenario import Component

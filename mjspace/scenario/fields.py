@@ -19,7 +19,7 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
-from mjspace.plain_text import is_file_name, shortened
+from mjspace.errors import is_file_name, shortened
 from mjspace.ranges import FORMS, Form
 from mjspace.scenario.trust import CommandLineText
 from mjspace.units import Unit, quantity, to_si

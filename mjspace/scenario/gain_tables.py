@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.plain_text import shortened
+from mjspace.errors import shortened
 
 
 def columns(path: Path) -> dict[str, Any]:

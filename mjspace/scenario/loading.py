@@ -9,8 +9,7 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel, ValidationError
 
-from mjspace.errors import InputError, nearest
-from mjspace.plain_text import shortened
+from mjspace.errors import InputError, nearest, shortened
 from mjspace.scenario import files
 from mjspace.scenario import overrides as keys
 from mjspace.scenario.construct import plain

@@ -4,8 +4,7 @@ import tomllib
 from collections.abc import Iterable
 from typing import Any
 
-from mjspace.errors import InputError
-from mjspace.plain_text import is_plain
+from mjspace.errors import InputError, is_plain
 from mjspace.scenario import raw
 from mjspace.scenario.trust import CommandLineText
 

@@ -3,7 +3,7 @@
 import tomllib
 from typing import Any
 
-from mjspace.plain_text import is_plain, shortened
+from mjspace.errors import is_plain, shortened
 from mjspace.units import is_out_of_scale
 
 DEEPEST = 20

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mjspace.plain_text import shortened
+from mjspace.errors import shortened
 
 if TYPE_CHECKING:
     from mjspace.log.reader import Log

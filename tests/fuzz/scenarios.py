@@ -11,8 +11,7 @@ from typing import Any
 
 import tomli_w
 
-from mjspace.errors import FlightError, InputError
-from mjspace.plain_text import is_plain, shortened
+from mjspace.errors import FlightError, InputError, is_plain, shortened
 from mjspace.runner.checks import refuse_unknown
 from mjspace.scenario import files
 from mjspace.scenario.loading import load

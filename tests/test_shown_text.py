@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mjspace.plain_text import is_file_name, is_plain, printable, shortened
+from mjspace.errors import is_file_name, is_plain, printable, shortened
 
 
 @pytest.mark.parametrize(
