@@ -1,14 +1,20 @@
-"""Errors that are reported in one line: bad input, a flight that cannot go on, no renderer."""
+"""Errors that are reported in one line: bad input, a flight that cannot go on, no renderer.
+
+A line shows text from outside without control characters, and not too long.
+"""
 
 import difflib
 import sys
 import traceback
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 _TESTBED = Path(__file__).parent
+_CONTROL = {"Cc", "Cf", "Cs"}  # control and format characters (bidirectional marks), surrogates
+_LONGEST_NAME = 100
 
 
 class InputError(ValueError):
@@ -36,6 +42,24 @@ def input_error_at(key: str) -> Iterator[None]:
         raise InputError(message if named else f"{key}: {message}") from error
 
 
+@contextmanager
+def whole_or_none(path: Path) -> Iterator[None]:
+    """Remove the file that the block began and could not write to its end; name it in an OSError.
+
+    What could not even be opened is left as it is.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None:
+            path.unlink(missing_ok=True)
+            error.filename = str(path)
+        raise
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
+
+
 def failure(who: str, error: Exception) -> FlightError:
     """Return the error that says what ``who`` raised, and at which line of the user's code.
 
@@ -56,7 +80,7 @@ def nearest(name: str, names: Any) -> str:
 
 def print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Print a warning as one line, in place of ``warnings.showwarning``."""
-    print(f"mjspace: warning: {message}", file=sys.stderr)
+    print(f"mjspace: warning: {printable(str(message))}", file=sys.stderr)
 
 
 def place_of(error: Exception) -> str:
@@ -79,3 +103,37 @@ def _is_users(path: Path) -> bool:
         return path.is_relative_to(_TESTBED / "controllers")
     libraries = (sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
     return path.suffix == ".py" and not any(map(path.is_relative_to, libraries))
+
+
+def is_plain(text: str) -> bool:
+    """Return whether a text has no character that controls a terminal or hides in it."""
+    return (text.isascii() and text.isprintable()) or not any(map(_controls, text))
+
+
+def printable(text: str) -> str:
+    """Return the text with every control character but the line's end written out, as ``\\x1b``."""
+    if is_plain(text):
+        return text
+    return "".join(
+        character.encode("unicode_escape").decode()
+        if _controls(character) and character != "\n"
+        else character
+        for character in text
+    )
+
+
+def shortened(text: str, most: int = 200) -> str:
+    """Return the text on one line, without the middle of what is longer than ``most``."""
+    line = " ".join(printable(text).split())
+    half = most // 2 - 2
+    return line if len(line) <= most else f"{line[:half]} ... {line[-half:]}"
+
+
+def is_file_name(text: str) -> bool:
+    """Return whether a text can be the name of a file or a folder, and leads to no other place."""
+    short = 0 < len(text.encode(errors="replace")) <= _LONGEST_NAME
+    return short and is_plain(text) and text not in (".", "..") and not set(text) & set("/\\:\0")
+
+
+def _controls(character: str) -> bool:
+    return unicodedata.category(character) in _CONTROL

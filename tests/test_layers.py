@@ -40,7 +40,7 @@ ROOMS = {
         "constants contract environment errors gufunc scenario sensors signals units vehicle"
     ),
     "log": "attitude contract scenario units",
-    "plotting": "contract log scenario signals units",
+    "plotting": "contract errors log scenario signals units",
     "rendering": "attitude contract environment errors log vehicle",
     "simulation": (
         "actuators attitude contract environment errors scenario sensors signals tracing vehicle"

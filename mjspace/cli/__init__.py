@@ -5,6 +5,7 @@ differed, or the flight ended early), 2 bad input. Modules are imported when a c
 ``--help`` answers at once.
 """
 
+import sys
 import warnings
 
 import typer
@@ -33,6 +34,8 @@ app.command()(validation.validate)
 def main() -> None:
     """Run the command line; the entry point."""
     warnings.showwarning = print_warning
+    for stream in (sys.stdout, sys.stderr):  # whatever the terminal's encoding
+        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     with report_errors():
         graphics.check()
         app()

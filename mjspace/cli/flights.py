@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from mjspace.errors import InputError
-from mjspace.terminal.options import Json, LogFile, Out, Plot, Set, Traceback, Video
+from mjspace.terminal.options import Json, LogFile, Out, Plot, Set, Traceback, Trust, Video
 from mjspace.terminal.reporting import cause_shown, open_log, print_cause, progress_bar
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def run(
     plot_it: Plot = False,
     video: Video = False,
     as_json: Json = False,
+    trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
     """Fly a scenario, log it and judge it."""
@@ -45,7 +46,7 @@ def run(
         _run_all([*overrides, *extra], output_folder(out, "all"), as_json)
     with cause_shown(traceback):
         loaded, folder = load(scenario, [*overrides, *extra])
-        assembly = assemble(loaded, folder)
+        assembly = assemble(loaded, folder, trust=trust)
         with progress_bar(loaded.duration, "flying") as progress:
             path = output_folder(out, loaded.name) / "flight.mcap"
             result = fly_to_log(assembly, path, progress=progress)
@@ -84,6 +85,7 @@ def replay(
     plot_it: Plot = False,
     video: Video = False,
     as_json: Json = False,
+    trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
     """Fly a log again: to prove it, or under another law."""
@@ -97,7 +99,7 @@ def replay(
     logged = open_log(log)
     with cause_shown(traceback), progress_bar(logged.end, "flying") as progress:
         if verify:
-            difference = again.verify(log, start=start, progress=progress)
+            difference = again.verify(log, start=start, trust=trust, progress=progress)
         else:
             result = again.replay(
                 log,
@@ -105,6 +107,7 @@ def replay(
                 start=start,
                 law=law or None,
                 gains=gains,
+                trust=trust,
                 progress=progress,
             )
     if not verify:

@@ -128,6 +128,7 @@ class LogFile:
             while rest:
                 rest = rest[self._file.write(rest) :]
         except OSError as error:
+            error.filename = self._file.name
             self._error = error
             raise
         self._position += len(data)

@@ -1,8 +1,7 @@
 """The scenario that a log says was flown."""
 
-import tomllib
-
 from mjspace.log.reader import Log
+from mjspace.scenario import raw
 from mjspace.scenario.loading import validate
 from mjspace.scenario.scenario import Scenario
 
@@ -13,6 +12,6 @@ def scenario_of(log: Log) -> Scenario:
     Raises:
         ValueError: the log does not hold it, or it is not valid for this version of mjspace.
     """
-    table = tomllib.loads(log.attachment("scenario.toml").decode())
+    table = raw.parsed(log.attachment("scenario.toml").decode())
     table.pop("verdict", None)  # of logs from before checks said how they are expected to come out
     return validate(table, f"the scenario in {log.path}", context={"flown": True})

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
 
-from mjspace.errors import FlightError
+from mjspace.errors import FlightError, InputError, is_file_name, shortened
 from mjspace.log.reader import Log
 from mjspace.runner.checks import Verdict, refuse_other_dimensions, refuse_unknown
 from mjspace.runner.flight_log import units_of
@@ -52,12 +52,14 @@ def run(
     *,
     overrides: Iterable[str] = (),
     out: str | Path | None = None,
+    trust: bool = False,
     progress: Progress = lambda time: None,
 ) -> Result:
     """Fly a scenario, by name or path, and judge it; the log is ``flight.mcap`` in ``out``.
 
     ``overrides`` are ``"key=value"``, as ``--set`` takes them; ``out`` is
-    ``runs/<scenario>/<UTC stamp>`` when left out.
+    ``runs/<scenario>/<UTC stamp>`` when left out. With ``trust`` the scenario may name files
+    outside its folder and any installed module.
 
     Raises:
         InputError: bad input, in one line; nothing has been written.
@@ -65,14 +67,20 @@ def run(
         OSError: the log cannot be written (any more); it keeps what it has.
     """
     loaded, folder = load(scenario, overrides)
-    assembly = assemble(loaded, folder)
+    assembly = assemble(loaded, folder, trust=trust)
     return fly_to_log(assembly, output_folder(out, loaded.name) / "flight.mcap", progress=progress)
 
 
 def output_folder(out: str | Path | None, name: str) -> Path:
-    """Return where a run called ``name`` writes."""
+    """Return where a run called ``name`` writes.
+
+    Raises:
+        InputError: a name, as that of a log's scenario, which no folder can have.
+    """
     if out is not None:
         return Path(out)
+    if not is_file_name(name):
+        raise InputError(f"{shortened(name)!r} is no name of a folder: give one by --out")
     return Path("runs") / name / datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
 
 

@@ -79,7 +79,7 @@ def beside(path: Path) -> dict[str, bytes]:
 def source_of(kind: type) -> str:
     """Return the text of the file that defines ``kind``."""
     text: str | None = getattr(sys.modules[kind.__module__], _SOURCE, None)
-    return text if text is not None else Path(inspect.getfile(kind)).read_text()
+    return text if text is not None else Path(inspect.getfile(kind)).read_text(encoding="utf-8")
 
 
 def files_of(kind: type) -> dict[str, bytes]:

@@ -19,4 +19,11 @@ Plot = Annotated[bool, typer.Option("--plot", help="Also plot the log: flight.pn
 Traceback = Annotated[
     bool, typer.Option("--traceback", help="Show what your own code raised in full.")
 ]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust",
+        help="Let it run code out of the log, from any installed module or another folder.",
+    ),
+]
 Video = Annotated[bool, typer.Option("--video", help="Also render the log: flight.mp4.")]

@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mjspace.errors import shortened
+
 if TYPE_CHECKING:
     from mjspace.log.reader import Log
 
@@ -67,7 +69,7 @@ def report_errors() -> Iterator[None]:
         status = _status(error)
         if status is None:
             raise
-        print(f"mjspace: {error}", file=sys.stderr)
+        print(f"mjspace: {shortened(str(error), 1500)}", file=sys.stderr)
         sys.exit(status)
 
 

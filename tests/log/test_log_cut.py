@@ -3,18 +3,17 @@
 import errno
 import os
 import re
-import resource
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from full_disk import room_for
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from log_samples import BLOCKS, METADATA, create, fly, rows, write_block
@@ -164,17 +163,6 @@ def test_a_killed_flight_leaves_all_but_the_chunks_in_flight(tmp_path: Path) -> 
     read = log.read("/state")
     np.testing.assert_array_equal(read["time"], time)
     np.testing.assert_array_equal(read["physics"], values["/state"]["physics"])
-
-
-@contextmanager
-def room_for(size: int) -> Iterator[None]:
-    """Let files grow to ``size`` bytes: the kernel writes a part and fails, as on a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_disk_that_fills_up_is_an_error_and_what_fitted_is_kept(
