@@ -23,8 +23,8 @@ from mjspace.tracing.replay import address_of, copy_bytes, placed, run
 _NUMBER, _TABLE = np.int64, (np.int64, (2,))  # a table: its address, its rows
 ORDERS = np.dtype([
     # MuJoCo's functions, and the state that mj_getState and mj_setState mean
-    ("step", _NUMBER), ("step1", _NUMBER), ("forward", _NUMBER), ("set_const", _NUMBER),
-    ("get_state", _NUMBER), ("set_state", _NUMBER), ("state", _NUMBER),
+    ("step", _NUMBER), ("step1", _NUMBER), ("forward", _NUMBER), ("setConst", _NUMBER),
+    ("getState", _NUMBER), ("setState", _NUMBER), ("state", _NUMBER),
     # numbers of the block's first period and of the flight's last, which is not flown
     ("first", _NUMBER), ("last", _NUMBER),
     # halves to be flown: 2 k is the control instant of the block's period k, 2 k + 1 its steps
@@ -38,7 +38,6 @@ ORDERS = np.dtype([
     ("memory", *_TABLE), ("words", *_TABLE), ("relative", *_TABLE),
     ("looking", *_TABLE), ("sensing", *_TABLE), ("driving", *_TABLE), ("preparing", *_TABLE),
     ("after_looking", *_TABLE), ("after_sensing", *_TABLE), ("after_driving", *_TABLE),
-    ("after_preparing", *_TABLE),
     # into the memory at a control instant, and before a period's steps: (to, address, strides of
     # periods and vehicles, size)
     ("inputs", *_TABLE), ("commands", *_TABLE),
@@ -129,8 +128,8 @@ def _write_masses(orders: Any, fields: Any, base: int) -> None:
 @njit
 def _derive(orders: Any, model: int, data: int, base: int, fields: Any) -> None:
     """Derive the model's constants, and return to the step that begins."""
-    of_model_and_data(orders.set_const, model, data)
-    with_state(orders.set_state, model, data, base + orders.state_row, orders.state)
+    of_model_and_data(orders.setConst, model, data)
+    with_state(orders.setState, model, data, base + orders.state_row, orders.state)
     _write(fields, base, _table(orders.applied, 4))
     _write(fields, base, _table(orders.written, 4))
 
@@ -232,7 +231,7 @@ def _fly_steps(
         prepared = step == 0 or orders.prepared != 0
         if step and (acting or prepared):
             time[0] = (number * orders.steps + step) * orders.physics
-            with_state(orders.get_state, model, data, base + orders.state_row, orders.state)
+            with_state(orders.getState, model, data, base + orders.state_row, orders.state)
         if acting:
             run(driving, words)
             _write(fields, base, applied)
@@ -286,7 +285,7 @@ def _fly(
         record = orders.record + k * orders.period_stride + vehicle * orders.vehicle_stride
         if half % 2 == 0 or half == orders.begin:
             time[0] = number * orders.control
-            with_state(orders.get_state, model, data, base + orders.state_row, orders.state)
+            with_state(orders.getState, model, data, base + orders.state_row, orders.state)
         if half % 2 == 0:
             _copy_inputs(base, inputs, k, vehicle)
             told = _begin_period(orders, base, words, model, data, fields, record)

@@ -175,12 +175,15 @@ class CompiledBlocks:
                     break
         flight.fly_periods(flown)
         if flight.told < count:  # Python flies the period in which something is told
-            flown, trouble = min(flown, flight.told), None
+            called, flown, trouble = flown, min(flown, flight.told), None
             flight.set(first.physics, first.memory, first.sensors, first.law)
             flight.begin(first.number, flown, last, desired, calls.commands)
             flight.fly_periods(flown)
             if sensing is not None:
                 self._stepper.sensors = sensing.sensors_before(flown, self._stepper.sensors)
+            if called > flown > 0:
+                time = (first.number + flown) * control
+                self._law.called = time, *calls.returned(flown)
         self._law.state = calls.state_before(flown)
         groups = flight.columns().groups | calls.groups(flown)
         if sensing is not None:
@@ -251,7 +254,7 @@ class CompiledBlocks:
 
     def _off(self, reason: str, after: "_After") -> None:
         """Let Python fly on from ``after`` the first period."""
-        self.on, self.reason, self._flight = False, reason, None
+        self.on, self.reason, self._flight, self._law.called = False, reason, None, None
         self._go_back_to(after)
 
     def _go_back_to(self, then: "_After") -> None:

@@ -216,16 +216,16 @@ class CompiledFlight:
         rates, model = assembly.scenario.rates, assembly.vehicle.model
         words_of_model, words_of = struct_offsets.find()
         orders = np.zeros((), ORDERS)
-        for name, function in (
-            *(("step", "step"), ("step1", "step1"), ("forward", "forward")),
-            *(("set_const", "setConst"), ("get_state", "getState"), ("set_state", "setState")),
-        ):
-            orders[name] = address(f"mj_{function}")
+        for function in ("step", "step1", "forward", "setConst", "getState", "setState"):
+            orders[function] = address(f"mj_{function}")
         orders["state"] = int(INTEGRATION)
         orders["steps"], orders["driven"] = rates.steps, assembly.driven_stepwise
         orders["prepared"] = any(effect.every_step for effect in self._effects)
         orders["control"], orders["physics"] = rates.control, rates.physics
-        drives = [kind.drives for kind in assembly.actuators.kinds]
+        applied = [
+            Write(kind.drives.array, kind.drives.slice_of(model).start, values)
+            for kind, values in zip(assembly.actuators.kinds, period.applied, strict=True)
+        ]
         tables = {
             "memory": period.program.memory.view(np.int64),
             **self._sections(),
@@ -233,15 +233,7 @@ class CompiledFlight:
                 (self._offset(each), place, each.nbytes)
                 for each, place in zip(remembered, places, strict=True)
             ),
-            "applied": _table(
-                (
-                    getattr(words_of, driven.array),
-                    _WORD * driven.slice_of(model).start,
-                    self._offset(values),
-                    values.nbytes,
-                )
-                for driven, values in zip(drives, period.applied, strict=True)
-            ),
+            "applied": self._writes(applied, words_of),
             "written": self._writes(period.written, words_of),
             "masses": self._writes(period.masses, words_of_model),
             "before": self._record_table(period.before, self._record_places),
@@ -261,10 +253,8 @@ class CompiledFlight:
         orders["sensors_size"] = period.sensordata.nbytes
         for name in ("body_mass", "body_parentid", "body_subtreemass"):
             orders[name] = getattr(words_of_model, name)
-        orders["bodies"], orders["most_constraints"] = (
-            model.nbody,
-            struct_offsets.most_constraints(),
-        )
+        orders["bodies"] = model.nbody
+        orders["most_constraints"] = struct_offsets.most_constraints()
         orders["looks"] = any(effect.looks for effect in self._effects)
         for name in ("looking", "sensing", "preparing"):
             told = getattr(period, name).report
@@ -279,7 +269,8 @@ class CompiledFlight:
         for name in ("looking", "sensing", "driving", "preparing"):
             calls, after, _ = getattr(period, name)
             tables[name] = calls.table + np.array([0, 0, used, used, used])
-            tables[f"after_{name}"] = self._copies(after)
+            if name != "preparing":  # which leads to no other state
+                tables[f"after_{name}"] = self._copies(after)
             words.append(calls.words)
             relative.append(calls.relative)
             used += len(calls.words)

@@ -78,6 +78,14 @@ class LawCalls:
             strict=True,
         )
 
+    def returned(self, k: int) -> tuple[Any, Any, Any]:
+        """Return (state, command, signals) as of the call in period ``k``."""
+        command, signals = (
+            self._kinds[group](*(_read_only(column)[k] for column in self._columns[group]))
+            for group in _GROUPS[1:]
+        )
+        return self.state_before(k + 1), command, signals
+
     def state_before(self, k: int) -> Any:
         """Return the law's state before period ``k``, or after the last; read-only or empty."""
         kind, columns = self._kinds["law"], self._columns["law"]

@@ -184,6 +184,37 @@ def test_a_law_that_is_called_in_python_lands_as_well(
         assert any("first contact" in event.message for event in python.events)
 
 
+COUNTS = """
+from mjspace.controllers.landing.lander import VariableStructure
+
+calls = []
+
+
+class Law(VariableStructure):
+    def step(self, state, time, measurement, reference):
+        calls.append(time)
+        state, command, signals = super().step(state, time, measurement, reference)
+        return state, command._replace(gimbal=command.gimbal + 1e-4 * len(calls)), signals
+"""
+
+
+@pytest.mark.parametrize("sensors", [[], ["sensors.position.period='60 ms'"]])
+def test_a_law_that_is_called_in_python_is_called_once_where_something_happens(
+    sensors: list[str], tmp_path: Any
+) -> None:
+    flights = []
+    for compiled in (True, False):
+        folder = tmp_path / str(compiled)
+        folder.mkdir()
+        (folder / "own.py").write_text(COUNTS)
+        own = "law.kind='own.py:Law'"
+        built = assembly("lander", *CRASHES, *sensors, own, folder=folder)
+        flights.append(flown(built, compiled=compiled))
+    assert "law called in Python" in flights[0].compiled
+    assert len(flights[1].events) >= 2
+    assert_same(*flights)
+
+
 @pytest.mark.parametrize(
     ("name", "overrides", "reason"),
     [
