@@ -26,6 +26,8 @@ ORDERS = np.dtype([
     ("step", _NUMBER), ("forward", _NUMBER), ("get_state", _NUMBER), ("state", _NUMBER),
     # numbers of the block's first period, of its periods, and of the flight's last, not flown
     ("first", _NUMBER), ("count", _NUMBER), ("last", _NUMBER),
+    # where the number of a signal stands that ends the block, and each vehicle's whole periods
+    ("received", _NUMBER), ("whole", _NUMBER),
     # integration steps of a period; 1 where the actuators act in each of them
     ("steps", _NUMBER), ("stepwise", _NUMBER),
     # control period and integration step [s]
@@ -118,8 +120,11 @@ def _copy(target: int, source: int, table: Any) -> None:
 @njit
 def _fly(
     orders: Any, memory: Any, words: Any, model: int, data: int, fields: Any, vehicle: int
-) -> None:
-    """Fly a block on a ``memory`` and the ``words`` placed there, which the caller keeps alive."""
+) -> Any:
+    """Fly a block on a ``memory`` and the ``words`` placed there, which the caller keeps alive.
+
+    Return the number of its whole periods: all, unless a signal is received.
+    """
     base = address_of(memory)
     sensing, driving = _table(orders.sensing, 5), _table(orders.driving, 5)
     inputs, remembered = _table(orders.inputs, 5), _table(orders.remembered, 3)
@@ -127,6 +132,7 @@ def _fly(
     before, after = _table(orders.before, 3), _table(orders.after, 3)
     applied = _table(orders.applied, 4)
     time = carray(pointer(base + orders.time), (1,), np.float64)
+    received = carray(pointer(orders.received), (1,), np.int64)
     motors = orders.saturated[1]
     saturated = carray(pointer(base + orders.saturated[0]), (motors,), np.float64)
     row = orders.row + vehicle * orders.row_stride
@@ -146,6 +152,8 @@ def _fly(
         _copy(record, base, before)
         _copy(base, base, after_sensing)
         for step in range(orders.steps if flown else 1):
+            if received[0] != 0:
+                return k
             acting = step == 0 or orders.stepwise != 0
             if acting:
                 if step:
@@ -165,6 +173,7 @@ def _fly(
                 _copy(base, base, after_driving)
     for i in range(len(remembered)):
         copy_bytes(row + remembered[i, 1], base + remembered[i, 0], remembered[i, 2])
+    return orders.count
 
 
 @functools.cache
@@ -191,6 +200,7 @@ def _compiled(version: int) -> Any:
             fields = carray(data, (_MOST_WORDS,), np.int64)
             memory = _words(orders.memory).copy()
             words = placed(_words(orders.words), _words(orders.relative), address_of(memory))
-            _fly(orders, memory, words, _address(model), _address(data), fields, vehicle)
+            whole = carray(pointer(orders.whole + 8 * vehicle), (1,), np.int64)
+            whole[0] = _fly(orders, memory, words, _address(model), _address(data), fields, vehicle)
 
     return fly

@@ -9,6 +9,7 @@ from mujoco.batch import SimulationError
 
 from mjspace.contract import Array, DesiredMotion
 from mjspace.errors import FlightError
+from mjspace.interrupts import Interrupted
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compile_period import compile_period
 from mjspace.simulation.compiled_flight import CompiledFlight
@@ -62,14 +63,15 @@ class CompiledBlocks:
         last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> tuple[Columns, FlightError | None]:
-        """Return the columns of up to ``count`` periods, and what the law raised after them.
+    ) -> tuple[Columns, FlightError | Interrupted | None]:
+        """Return the columns of up to ``count`` periods, and what ended the flight after them.
 
         Python has flown the ``first``, whose ``columns`` are given. Where the compiled block cannot
         be had, or differs from them or in the state that they lead to, they are returned, and
         Python flies on. ``stop`` is called in each period in which the law is called in Python.
         """
-        after, trouble = self._after_a_period(), None
+        after = self._after_a_period()
+        trouble: FlightError | Interrupted | None = None
         try:
             flight = self._flight or self._compile(first, desired)
             flight.set(first.physics, first.memory, first.sensors, first.law)
@@ -85,6 +87,10 @@ class CompiledBlocks:
         if flight.warned:
             self._off("MuJoCo warned", after)
             return columns, None
+        if flight.broken_off:
+            trouble = Interrupted(flight.broken_off)
+            if not len(compiled):
+                return columns, trouble
         different = _difference(columns, compiled) or after.difference(compiled)
         if different:
             warnings.warn(
@@ -109,17 +115,20 @@ class CompiledBlocks:
         count: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> tuple[Columns, FlightError | None]:
+    ) -> tuple[Columns, FlightError | Interrupted | None]:
         """Fly the block with the law, and the sensors, called in each period.
 
-        Return its columns, and what the law raised after them.
+        Return its columns, and what ended the flight after them.
         """
-        trouble: FlightError | None = None
+        trouble: FlightError | Interrupted | None = None
         recording = Recording(first, count, OF_THE_LAW)
         flight.fly_period(first.command)
-        recording.write(first)
+        if not flight.broken_off:
+            recording.write(first)
         rows: Any = zip(*(array[1:count] for array in desired), strict=True)
         for number, row in enumerate(rows, first.number + 1):
+            if flight.broken_off:
+                break
             self._take(flight)
             period = self._stepper.sense(number)
             try:
@@ -130,8 +139,12 @@ class CompiledBlocks:
             except FlightError as error:
                 trouble = stopped_at(period.time, error)
                 break
+            except Interrupted as error:
+                trouble = error
+                break
             flight.fly_period(period.command)
-            recording.write(period)
+            if not flight.broken_off:
+                recording.write(period)
             if stop():
                 break
         of_law, columns = recording.columns(), flight.columns()

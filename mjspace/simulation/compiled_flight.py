@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mjspace import interrupts
 from mjspace.contract import Array, DesiredMotion
 from mjspace.environment import struct_offsets
 from mjspace.simulation.assembly import Assembly
@@ -28,6 +29,8 @@ class CompiledFlight:
         sensors: what the sensors remember, likewise.
         law: the law's state, a named tuple of arrays (N, ...), or empty.
         command: the law's command, arrays (N, ...), where the period begins with it.
+        broken_off: the signal that ended the block within a period, after which it cannot go on;
+            0 for none.
     """
 
     def __init__(
@@ -63,6 +66,9 @@ class CompiledFlight:
         self._record_places, self._record_size = _packed(
             [*(each.array for each in (*period.before, *period.after)), period.saturated]
         )
+        self._whole = np.zeros(vehicles, np.int64)
+        """Whole periods that each vehicle has flown of the last call."""
+        self.broken_off = 0
         self._tables: list[np.ndarray] = []
         self._orders = self._constant_orders(remembered, places)
         self._function = block_function().address
@@ -130,7 +136,10 @@ class CompiledFlight:
         orders["first"], orders["count"] = self._first + self._flown, count
         orders["record"] = recorded.ctypes.data + self._flown * recorded.strides[0]
         self._batch.apply(self._function, orders.ctypes.data)
-        self._flown += count
+        whole = int(self._whole.min())
+        self._flown += whole
+        if whole < count:
+            self.broken_off = interrupts.received[0]
 
     @property
     def has_law(self) -> bool:
@@ -206,6 +215,8 @@ class CompiledFlight:
             table = np.ascontiguousarray(table)
             self._tables.append(table)  # keeps alive what the orders point to
             orders[name] = table.ctypes.data, len(table)
+        orders["received"] = interrupts.received.buffer_info()[0]
+        orders["whole"] = self._whole.ctypes.data
         orders["row"], orders["row_stride"] = self._rows.ctypes.data, self._rows.strides[0]
         orders["time"] = self._offset(period.time)
         orders["state_row"] = self._offset(period.physics)

@@ -51,7 +51,7 @@ class FlownLaw:
             returned = self._law.step(before, time, measurement, reference)
         except ReturnError:
             raise
-        except Exception as error:
+        except BaseException as error:
             raise failure("the law", error) from error
         self._check(before, returned)
         state, command, signals = returned
@@ -66,7 +66,7 @@ class FlownLaw:
         """
         try:
             returned = self._law.inner(self.state, time, command, measurement)
-        except Exception as error:
+        except BaseException as error:
             raise failure("the law's inner loop", error) from error
         check_inner(returned)
         self.state = _kept(returned[0])
