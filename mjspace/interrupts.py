@@ -37,31 +37,38 @@ class Stop:
     def __init__(self) -> None:
         self.signal = 0
         self.since = 0.0
-        self._may_break_off = False
+        self._breakable = False
 
     def __call__(self) -> bool:
         """Return whether a signal has been received."""
         return self.signal != 0
 
-    def breaking_off(self, blocks: Iterator[_Block]) -> Iterator[_Block]:
-        """Yield the ``blocks``; after the grace time the making of one is broken off.
+    @contextmanager
+    def breakable(self) -> Iterator[None]:
+        """Let the context be broken off after the grace time.
 
         Raises:
             Interrupted: so it was.
         """
+        self._breakable = True
+        try:
+            yield
+        finally:
+            self._breakable = False
+
+    def breaking_off(self, blocks: Iterator[_Block]) -> Iterator[_Block]:
+        """Yield the ``blocks``; the making of each is breakable."""
         while True:
-            self._may_break_off = True
             try:
-                block = next(blocks)
+                with self.breakable():
+                    block = next(blocks)
             except StopIteration:
                 return
-            finally:
-                self._may_break_off = False
             yield block
 
     def break_off(self, *_: Any) -> None:
-        """Raise ``Interrupted`` where a block is being made: a handler of signals."""
-        if self._may_break_off:
+        """Raise ``Interrupted`` in what is breakable: a handler of signals."""
+        if self._breakable:
             raise Interrupted(self.signal)
 
 

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from mjspace import interrupts
 from mjspace.errors import FlightError, print_warning
-from mjspace.interrupts import Interrupted
+from mjspace.interrupts import Interrupted, Stop
 
 # Callbacks are global, so that every flight needs a process; threads do not survive a plain fork.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
@@ -47,42 +47,41 @@ def warm_up(module: str) -> None:
 
 def each(
     calls: Sequence[tuple[Callable[..., _Result], Any]],
-    stop: Callable[[], bool] = lambda: False,
+    stop: Stop | None = None,
 ) -> Generator[tuple[int, _Result], None, None]:
     """Make ``calls``, functions with their argument; yield (index, result) as they are done.
 
-    Once ``stop`` returns True no other call begins, and those under way get SIGTERM: flights end
+    Once ``stop`` is requested no other call begins, and those under way get SIGTERM: flights end
     with their log whole, and are yielded too. They get it as well when this generator is closed,
     or the process ends, in whatever way.
 
     Raises:
         FlightError: one of the processes was killed.
     """
+    stop = stop or Stop()
     warm_up(calls[0][0].__module__)
-    number = min(os.cpu_count() or 1, len(calls))
+    cores = min(os.cpu_count() or 1, len(calls))
     theirs, ours = _CONTEXT.Pipe(duplex=False)
-    with (
-        ours,
-        ProcessPoolExecutor(number, _CONTEXT, initializer=_begin, initargs=(theirs,)) as pool,
-    ):
+    with ours, ProcessPoolExecutor(cores, _CONTEXT, _begin, (theirs,)) as pool:
         due: dict[Future[Any], int] = {}
         try:
-            for index, (call, argument) in enumerate(calls):
-                due[pool.submit(_make, call, argument)] = index
+            with stop.breakable():  # the first waits until everything is imported
+                for index, (call, argument) in enumerate(calls):
+                    due[pool.submit(_make, call, argument)] = index
             while due:
                 done, _ = wait(due, timeout=_LOOK, return_when=FIRST_COMPLETED)
                 for future in done:
                     index = due.pop(future)
-                    for result in () if future.cancelled() else future.result():
+                    for result in future.result():
                         yield index, result
                 if stop() and not ours.closed:
                     ours.close()
-                    for future in due:
-                        future.cancel()
+                    due = {future: index for future, index in due.items() if not future.cancel()}
         except BrokenProcessPool as error:
-            raise FlightError(
-                "a process that flies was killed, as the system does for lack of memory"
-            ) from error
+            if not stop():
+                raise FlightError(
+                    "a process that flies was killed, as the system does for lack of memory"
+                ) from error
         finally:
             ours.close()
             pool.shutdown(wait=False, cancel_futures=True)
@@ -112,6 +111,7 @@ def _begin(parents: Connection) -> None:
     mujoco_warnings.silence()
     warnings.showwarning = print_warning
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    _idle.set()
     Thread(target=_end_with, args=(parents,), daemon=True).start()
 
 
@@ -121,7 +121,9 @@ def _end_with(parents: Connection) -> None:
     if not interrupts.received[0]:  # a flight that is ending already is left to it
         os.kill(os.getpid(), signal.SIGTERM)
     parent = parent_process()
-    if parent is not None:
-        parent.join()
-        _idle.wait(2.0 * interrupts.GRACE)
-        os._exit(1)
+    assert parent is not None
+    while parent.is_alive() and not _idle.wait(_LOOK):
+        pass
+    _idle.wait(2.0 * interrupts.GRACE)
+    parent.join(2.0 * interrupts.GRACE)  # a parent that goes on lets an idle worker end
+    os._exit(1)

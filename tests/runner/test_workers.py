@@ -8,8 +8,10 @@ import time
 from pathlib import Path
 
 import pytest
+from processes import in_session
 
 from mjspace.errors import FlightError
+from mjspace.interrupts import Stop
 from mjspace.log.reader import Log
 from mjspace.runner import workers
 
@@ -19,9 +21,10 @@ SLEEP = "import time; time.sleep(60)"
 def test_once_stopped_nothing_begins_and_what_is_under_way_ends() -> None:
     began = time.monotonic()
     calls = [(exec, "pass"), *[(exec, SLEEP)] * 5]
-    done: list[int] = []
-    for index, _ in workers.each(calls, lambda: bool(done)):
+    stop, done = Stop(), []
+    for index, _ in workers.each(calls, stop):
         done.append(index)
+        stop.signal = signal.SIGTERM
     assert done == [0]
     assert time.monotonic() - began < 30.0
 
@@ -40,21 +43,13 @@ def test_a_worker_that_was_killed_is_one_line() -> None:
         list(workers.each([(exec, suicide)]))
 
 
-def in_session(leader: int) -> list[str]:
-    """Return what still runs of the session that a process began."""
-    listed = subprocess.run(
-        ["ps", "-o", "pid=,args=", "-s", str(leader)], capture_output=True, text=True, check=False
-    )
-    return [line for line in listed.stdout.splitlines() if "<defunct>" not in line]
-
-
 PARENT = f"""
 from mjspace.runner import workers
 list(workers.each([(exec, "print('up', flush=True); {SLEEP}")] * 4))
 """
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="looks for the processes with ps")
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for the processes in /proc")
 @pytest.mark.parametrize(
     "number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
 )
