@@ -47,7 +47,9 @@ def test_a_log_is_replaced_on_request_alone(tmp_path: Path) -> None:
     assert Log(log).metadata["seed"] == "1"
 
 
-def test_neither_a_replay_nor_all_replaces_a_log(tmp_path: Path) -> None:
+def test_neither_a_replay_nor_all_replaces_a_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     log = fly(tmp_path / "one").path
     again = tmp_path / "again"
     replay(log, again)
@@ -57,9 +59,9 @@ def test_neither_a_replay_nor_all_replaces_a_log(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds the log that is to be flown again"):
         replay(log, tmp_path / "one", force=True)
     fly(tmp_path / "all" / "detumble-wheels")
+    monkeypatch.setattr("mjspace.runner.workers.each", None)  # nothing is flown
     with pytest.raises(InputError, match="is there already"):
         run_all.fly(["pd-plus", "detumble-wheels"], SHORT, tmp_path / "all", lambda done: None)
-    assert not (tmp_path / "all" / "pd-plus").exists()
 
 
 def test_a_log_that_is_being_written_is_not_replaced(tmp_path: Path) -> None:

@@ -43,6 +43,18 @@ def test_a_worker_that_was_killed_is_one_line() -> None:
         list(workers.each([(exec, suicide)]))
 
 
+def test_a_stopped_worker_begins_nothing() -> None:
+    """As what waits in its queue when the parent asks it to stop."""
+    before, calls = signal.getsignal(signal.SIGTERM), []
+    workers._stopped.set()
+    try:
+        assert workers._make(calls.append, 1) == []
+    finally:
+        workers._stopped.clear()
+        signal.signal(signal.SIGTERM, before)
+    assert calls == []
+
+
 PARENT = f"""
 from mjspace.runner import workers
 list(workers.each([(exec, "print('up', flush=True); {SLEEP}")] * 4))
