@@ -23,8 +23,10 @@ from mjspace.runner.replay import verify
 from mjspace.runner.run import run
 
 ALL = "--all"
-SCENARIOS = ("contraction-ideal", "contraction-noise", "detumble-wheels", "dgvscmg-ideal")
-SCENARIOS += ("wheel-failure", "rcs-schmitt", "lander", "yo-yo-despin", "b-dot", "pd-plus")
+SCENARIOS = (
+    *("contraction-ideal", "contraction-noise", "detumble-wheels", "dgvscmg-ideal", "lander"),
+    *("wheel-failure", "rcs-schmitt", "yo-yo-despin", "b-dot", "pd-plus"),
+)
 LATEST = 4.0
 """The signal comes until then [s]; a process that flies them all takes longer to begin."""
 LOST = 1.0

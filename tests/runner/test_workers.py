@@ -45,7 +45,8 @@ def test_a_worker_that_was_killed_is_one_line() -> None:
 
 def test_a_stopped_worker_begins_nothing() -> None:
     """As what waits in its queue when the parent asks it to stop."""
-    before, calls = signal.getsignal(signal.SIGTERM), []
+    before = signal.getsignal(signal.SIGTERM)
+    calls: list[int] = []
     workers._stopped.set()
     try:
         assert workers._make(calls.append, 1) == []
