@@ -86,7 +86,7 @@ def command_line(scenario: str, duration: int) -> None:
     command = [sys.executable, "-m", "mjspace", "run", scenario, "--duration", str(duration)]
     name = f"`mjspace run`, {duration} s of the first, start included"
     with tempfile.TemporaryDirectory() as folder:
-        run = partial(subprocess.run, [*command, "--out", folder], capture_output=True)
+        run = partial(subprocess.run, [*command, "--force", "--out", folder], capture_output=True)
         report((name, "yes"), run, vehicle, steps_of(vehicle), "")
 
 

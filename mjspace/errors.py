@@ -4,6 +4,7 @@ A line shows text from outside without control characters, and not too long.
 """
 
 import difflib
+import signal
 import sys
 import traceback
 import unicodedata
@@ -11,6 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from mjspace.interrupts import Interrupted
 
 _TESTBED = Path(__file__).parent
 _CONTROL = {"Cc", "Cf", "Cs"}  # control and format characters (bidirectional marks), surrogates
@@ -60,15 +63,28 @@ def whole_or_none(path: Path) -> Iterator[None]:
         raise
 
 
-def failure(who: str, error: Exception) -> FlightError:
+def failure(who: str, error: BaseException) -> FlightError:
     """Return the error that says what ``who`` raised, and at which line of the user's code.
 
-    Where none of the user's code is involved, it is the line of the testbed's.
+    Where none of the user's code is involved, it is the line of the testbed's. Also SystemExit and
+    the like are errors: user's code ends no program. A signal is none, and is raised.
     """
+    pass_on_signals(error)
     place = place_of(error)
     hint = ": what it receives is read-only, copy it first" if "read-only" in str(error) else ""
     message = " ".join(str(error).split())
-    return FlightError(f"{who} raised {type(error).__name__} at {place}: {message}{hint}")
+    raised = f"{who} raised {type(error).__name__} at {place}"
+    return FlightError(f"{raised}: {message}{hint}" if message else raised)
+
+
+def pass_on_signals(error: BaseException) -> None:
+    """Raise ``error`` again if a signal is its cause, and none of the user's code."""
+    is_ctrl_c = (
+        isinstance(error, KeyboardInterrupt)
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )
+    if is_ctrl_c or isinstance(error, Interrupted):
+        raise error
 
 
 def nearest(name: str, names: Any) -> str:
@@ -83,12 +99,21 @@ def print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"mjspace: warning: {printable(str(message))}", file=sys.stderr)
 
 
-def place_of(error: Exception) -> str:
+def place_of(error: BaseException) -> str:
     """Return "file.py:line" of the innermost frame of the user's, else of the testbed's."""
     frames = traceback.extract_tb(error.__traceback__)
-    users = [frame for frame in frames if _is_users(Path(frame.filename))]
     ours = [frame for frame in frames if Path(frame.filename).is_relative_to(_TESTBED)]
-    frame = (users or ours or frames)[-1]
+    return users_place_of(error) or _place((ours or frames)[-1])
+
+
+def users_place_of(error: BaseException) -> str:
+    """Return "file.py:line" of the innermost frame of the user's; "" where there is none."""
+    frames = traceback.extract_tb(error.__traceback__)
+    users = [frame for frame in frames if _is_users(Path(frame.filename))]
+    return _place(users[-1]) if users else ""
+
+
+def _place(frame: traceback.FrameSummary) -> str:
     return f"{Path(frame.filename).name}:{frame.lineno}"
 
 

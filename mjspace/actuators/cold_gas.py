@@ -24,8 +24,8 @@ from pydantic import Field
 from mjspace.actuators import tank as tanks
 from mjspace.actuators.base import Actuator, Context, Fields, Input, State, motors
 from mjspace.actuators.thruster_layout import ThrusterTable, names
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import Positive, Seconds, Si
 

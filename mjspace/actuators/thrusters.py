@@ -17,8 +17,8 @@ from mjspace.actuators.base import (
     motors,
 )
 from mjspace.actuators.thruster_layout import ThrusterTable, names
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import Positive, Seconds, Si, Time
 

@@ -14,10 +14,12 @@ import numpy as np
 
 from mjspace.contract import REPORTED_BY_PLANT, TICK, Array
 from mjspace.errors import InputError, failure, input_error_at
+from mjspace.interrupts import Interrupted, on_signals
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.runner.former_names import as_logged, logged_name
 from mjspace.runner.logged_code import code_of, require_trust, unpack
+from mjspace.runner.output import LOG, refuse_existing
 from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
@@ -60,6 +62,7 @@ def replay(
     gains: Iterable[str] = (),
     folder: Path = Path(),
     trust: bool = False,
+    force: bool = False,
     progress: Progress = lambda time: None,
 ) -> Result:
     """Fly a log again from time ``start`` [s] into a new log, ``flight.mcap`` in ``out``.
@@ -70,23 +73,27 @@ def replay(
     ``trust`` alone.
 
     Raises:
-        InputError: no such log, time, law or gain; ``out`` holds the log itself.
+        InputError: no such log, time, law or gain; ``out`` holds the log itself, or another that
+            ``force`` does not allow to replace.
         FlightError: the flight could not even begin.
         OSError: the new log cannot be written.
     """
     with input_error_at("log"):
         log = Log.of(log)
-    path = Path(out) / "flight.mcap"
+    path = Path(out) / LOG
     if path.exists() and path.samefile(log.path):
         raise InputError(f"--out {out}: holds the log that is to be flown again")
     if isinstance(law, str):
         law = component(law, gains)
     elif gains:
         raise InputError("gains: are for another law: name it by law")
+    refuse_existing(path, force=force)
     with assembly_of(log, law, folder, trust=trust) as assembly:
         begin = start_of(log, assembly, start, fresh_law=law is not None)
         member = int(log.metadata["member"])
-        return fly_to_log(assembly, path, member=member, start=begin, progress=progress)
+        return fly_to_log(
+            assembly, path, member=member, start=begin, force=force, progress=progress
+        )
 
 
 def verify(
@@ -112,9 +119,11 @@ def verify(
         raise InputError(
             f"log: {', '.join(altered)} changed since the flight, by the log's digests"
         )
-    with assembly_of(log, trust=trust) as assembly:
+    with assembly_of(log, trust=trust) as assembly, on_signals() as stop:
         begin = start_of(log, assembly, start)
-        for block in fly(assembly, begin, [int(log.metadata["member"])]):
+        for block in stop.breaking_off(fly(assembly, begin, [int(log.metadata["member"])])):
+            if stop():
+                raise Interrupted(stop.signal)
             flown = as_logged(one_vehicle(block), log.topics)
             _check_topics(log, block)
             logged = log.read_topics(dict.fromkeys(flown), start=block.time[0], end=block.time[-1])
@@ -228,7 +237,7 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
             template = assembly.law.reset(
                 measurement, type(desired)(*(values[0] for values in desired))
             )
-        except Exception as error:
+        except BaseException as error:
             raise InputError(f"log: {failure('the law', error)}") from error
         fields = getattr(template, "_fields", ())
         names = [logged_name(f"law_{field}", state) for field in fields]

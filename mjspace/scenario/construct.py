@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
-from mjspace.errors import nearest, shortened
+from mjspace.errors import failure, nearest, shortened
 from mjspace.ranges import numbers, refuse_unfit
 from mjspace.scenario.gain_tables import columns
 from mjspace.scenario.scenario import Component
@@ -74,7 +74,12 @@ def _build(
         else:
             _refuse_unlike(name, value, parameters[name].annotation, name_of_kind)
     refuse_unfit(values, declared)
-    built = kind(**values)
+    try:
+        built = kind(**values)
+    except ValueError:
+        raise
+    except BaseException as error:
+        raise ValueError(str(failure("it", error))) from error
     flown = {name: plain(getattr(built, name, values.get(name))) for name in parameters}
     return built, flown | dict(written)
 

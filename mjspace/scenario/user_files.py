@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
+from mjspace.errors import pass_on_signals
+
 DATA_FILES = "DATA_FILES"
 """What a user's module calls the tuple of names of the files beside it that it reads."""
 _SOURCE, _BESIDE = "_mjspace_source", "_mjspace_beside"  # texts, as the files may be gone later
@@ -44,8 +46,9 @@ def load_file(path: Path) -> ModuleType:
         setattr(module, _BESIDE, files)
         with _importable(path.parent.resolve(), files):
             spec.loader.exec_module(module)
-    except Exception as error:
+    except BaseException as error:
         del sys.modules[name]
+        pass_on_signals(error)
         raise ValueError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
     return module
 

@@ -29,6 +29,8 @@ ORDERS = np.dtype([
     ("first", _NUMBER), ("last", _NUMBER),
     # halves to be flown: 2 k is the control instant of the block's period k, 2 k + 1 its steps
     ("begin", _NUMBER), ("end", _NUMBER),
+    # where the number of a signal stands, which ends the block
+    ("received", _NUMBER),
     # integration steps of a period; 1 where in each of them actuators act, or step effects
     ("steps", _NUMBER), ("driven", _NUMBER), ("prepared", _NUMBER),
     # control period and integration step [s]
@@ -215,7 +217,10 @@ def _fly_steps(
     number: int,
     derived: Any,
 ) -> Any:
-    """Fly the integration steps of that period; return whether there is an event in one."""
+    """Fly the integration steps of that period.
+
+    Return whether it is not to be flown to its end: there is an event in a step, or a signal.
+    """
     driving, preparing = _table(orders.driving, 5), _table(orders.preparing, 5)
     applied, written = _table(orders.applied, 4), _table(orders.written, 4)
     masses, after_driving = _table(orders.masses, 4), _table(orders.after_driving, 3)
@@ -224,9 +229,12 @@ def _fly_steps(
     saturated = carray(pointer(base + orders.saturated[0]), (motors,), np.float64)
     ever = carray(pointer(record + orders.saturated_record), (motors,), np.float64)
     ever[:] = 0.0
+    received = carray(pointer(orders.received), (1,), np.int64)
     flown = number < orders.last
     function = orders.step if flown else orders.forward
     for step in range(orders.steps if flown else 1):
+        if received[0] != 0:
+            return True
         acting = step == 0 or orders.driven != 0
         prepared = step == 0 or orders.prepared != 0
         if step and (acting or prepared):
@@ -269,7 +277,7 @@ def _fly(
 ) -> None:
     """Fly halves of a block on a ``memory`` and the ``words`` placed there, both kept alive.
 
-    Where a step effect has an event to tell, the vehicle flies no further.
+    Where a step effect has an event to tell, or a signal is received, the vehicle flies no further.
     """
     base = address_of(memory)
     inputs, commands = _table(orders.inputs, 5), _table(orders.commands, 5)

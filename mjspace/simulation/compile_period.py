@@ -13,6 +13,7 @@ import numpy as np
 
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
+from mjspace.interrupts import Interrupted
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.hidden_memory import refusing_hidden_memory
@@ -319,7 +320,9 @@ def _of_the_law() -> Iterator[None]:
     """Name the line of the law that cannot be taken down, or that raised anything else."""
     try:
         yield
-    except Exception as error:
+    except Interrupted:
+        raise
+    except BaseException as error:
         raise Untraceable(f"{error} ({place_of(error)})") from error
 
 

@@ -4,13 +4,14 @@ import itertools
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mujoco.batch import SimulationError
 
-from mjspace.contract import TICK, Array, DesiredMotion, Measurement
+from mjspace.contract import TICK, DesiredMotion, Measurement
 from mjspace.errors import FlightError
+from mjspace.interrupts import Interrupted
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compile_period import compile_period
 from mjspace.simulation.compiled_flight import CompiledFlight
@@ -18,6 +19,7 @@ from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import Start
 from mjspace.simulation.law_calls import LawCalls
+from mjspace.simulation.proof import AfterPeriod, difference
 from mjspace.simulation.recording import OF_SENSORS, Columns, Recording
 from mjspace.simulation.stepper import Stepper
 from mjspace.tracing.inner_loops import Untraceable
@@ -85,8 +87,8 @@ class CompiledBlocks:
         last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> tuple[Columns, FlightError | None]:
-        """Return the columns of up to ``count`` periods, and what the law raised after them.
+    ) -> tuple[Columns, FlightError | Interrupted | None]:
+        """Return the columns of up to ``count`` periods, and what ended the flight after them.
 
         Python has flown the ``first``, whose ``columns`` are given. Where the compiled block cannot
         be had, or differs from them or in the state that they lead to, they are returned, and
@@ -95,7 +97,8 @@ class CompiledBlocks:
         count = min(count, self._due(first.number + 1) - first.number)
         if count < 2 or columns.events:  # compiled code has no events, and cannot be held to it
             return columns, None
-        after, trouble = self._after_a_period(), None
+        after = self._after_a_period()
+        trouble: FlightError | Interrupted | None = None
         second = after._replace(memory=self._stepper.observed(first.number + 1))
         try:
             flight = self._flight or self._compile(first, desired)
@@ -104,7 +107,8 @@ class CompiledBlocks:
             if flight.has_law:
                 flight.begin(first.number, count, last, desired, ())
                 flight.fly_periods(count)
-                if 2 <= flight.told < count:  # Python flies the period in which something is told
+                if 2 <= flight.told < count and not flight.broken_off:
+                    # Python flies the period in which something is told
                     count = flight.told
                     flight.set(first.physics, first.memory, first.sensors, first.law)
                     flight.begin(first.number, count, last, desired, ())
@@ -118,10 +122,12 @@ class CompiledBlocks:
         if flight.warned:
             self._off("MuJoCo warned", after)
             return columns, None
+        if flight.broken_off:
+            trouble = Interrupted(flight.broken_off)
         if flight.told < 2:
             self._go_back_to(after)
-            return columns, None
-        different = _difference(columns, compiled) or second.difference(compiled)
+            return columns, trouble
+        different = difference(columns, compiled) or second.difference(compiled)
         if different:
             warnings.warn(
                 f"compiled, {different} differs from what Python computes at t = "
@@ -168,10 +174,10 @@ class CompiledBlocks:
         last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> tuple[Columns, FlightError | None]:
+    ) -> tuple[Columns, FlightError | Interrupted | None]:
         """Fly the block with the law called in each period, and the sensors if not compiled.
 
-        Return its columns, and what the law raised after them.
+        Return its columns, and what ended the flight after them.
         """
         calls = LawCalls(self._law, first, count, self._stepper.check)
         flight.begin(first.number, count, last, desired, calls.commands)
@@ -184,7 +190,8 @@ class CompiledBlocks:
             measured = self._sensed(flight, first, calls, sensing)
         control = self._assembly.scenario.rates.control
         rows: Any = zip(*(array[1:count] for array in desired), strict=True)
-        flown, trouble = 1, None
+        flown = 1
+        trouble: FlightError | Interrupted | None = None
         with np.errstate(all="ignore"):
             for k, row in enumerate(rows, 1):
                 flight.fly_to_instant(k)
@@ -196,11 +203,16 @@ class CompiledBlocks:
                 except FlightError as error:
                     trouble = stopped_at(time, error)
                     break
+                except Interrupted as error:
+                    trouble = error
+                    break
                 flown = k + 1
                 if stop():
                     break
         flight.fly_periods(flown)
-        if flight.told < count:  # Python flies the period in which something is told
+        if flight.broken_off:
+            flown = min(flown, flight.told)
+        elif flight.told < count:  # Python flies the period in which something is told
             called, flown, trouble = flown, min(flown, flight.told), None
             flight.set(first.physics, first.memory, first.sensors, first.law)
             flight.begin(first.number, flown, last, desired, calls.commands)
@@ -277,16 +289,18 @@ class CompiledBlocks:
         )
         return self._flight
 
-    def _after_a_period(self) -> "_After":
+    def _after_a_period(self) -> AfterPeriod:
         stepper = self._stepper
-        return _After(stepper.batch.state.copy(), stepper.memory, stepper.sensors, self._law.state)
+        return AfterPeriod(
+            stepper.batch.state.copy(), stepper.memory, stepper.sensors, self._law.state
+        )
 
-    def _off(self, reason: str, after: "_After") -> None:
+    def _off(self, reason: str, after: AfterPeriod) -> None:
         """Let Python fly on from ``after`` the first period."""
         self.on, self.reason, self._flight, self._law.called = False, reason, None, None
         self._go_back_to(after)
 
-    def _go_back_to(self, then: "_After") -> None:
+    def _go_back_to(self, then: AfterPeriod) -> None:
         """Put stepper and law where they were ``then``, after another period."""
         stepper = self._stepper
         stepper.batch.state[...] = then.physics
@@ -308,42 +322,3 @@ def stopped_at(time: float, error: Exception) -> FlightError:
 
 def _copied(state: State) -> State:
     return {name: values.copy() for name, values in state.items()}
-
-
-class _After(NamedTuple):
-    """What a flight goes on from after the first period of a block."""
-
-    physics: Array
-    memory: State
-    sensors: State
-    law: Any
-
-    def difference(self, compiled: Columns) -> str:
-        """Return the name of the first field whose second row is another; "" for none."""
-        names = getattr(self.law, "_fields", ())
-        groups = {
-            "physics": {"": self.physics},
-            "memory": self.memory,
-            "sensors": self.sensors,
-            "law": dict(zip(names, self.law or (), strict=True)),
-        }
-        for group, arrays in groups.items():
-            for name, rows in compiled[group].items():
-                if len(rows) > 1 and _bits(rows[1]) != _bits(arrays[name]):
-                    return f"{group} {name} after a period".replace("  ", " ")
-        return ""
-
-
-def _difference(one: Columns, other: Columns) -> str:
-    """Return the name of the first field whose first rows differ in any bit; "" for none."""
-    for group in sorted(one.groups.keys() | other.groups.keys()):
-        if one[group].keys() != other[group].keys():
-            return f"{group} ({', '.join(one[group].keys() ^ other[group].keys())})"
-        for name, values in one[group].items():
-            if _bits(values[:1]) != _bits(other[group][name][:1]):
-                return f"{group} {name}".rstrip()
-    return ""
-
-
-def _bits(values: Array) -> tuple[tuple[int, ...], bytes]:
-    return values.shape, np.asarray(values, dtype=float).tobytes()

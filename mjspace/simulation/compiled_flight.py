@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mjspace import interrupts
 from mjspace.contract import Array, DesiredMotion
 from mjspace.environment import struct_offsets
 from mjspace.simulation.assembly import Assembly
@@ -29,8 +30,10 @@ class CompiledFlight:
         memory: what the actuators remember, by name, (N, ...).
         sensors: what the sensors remember, likewise.
         law: the law's state, a named tuple of arrays (N, ...), or empty.
-        stopped: in which period of the block each had an event to tell, (N,); if none, how many the
-            block has.
+        stopped: in which period of the block each had an event to tell, or was stopped by a signal,
+            (N,); if in none, how many the block has.
+        broken_off: the signal that ended the block within a period, after which it cannot go on;
+            0 for none.
     """
 
     def __init__(
@@ -68,6 +71,7 @@ class CompiledFlight:
             [*(each.array for each in (*period.before, *period.after)), period.saturated]
         )
         self.stopped = np.zeros(vehicles, np.int64)
+        self.broken_off = 0
         self._tables: list[np.ndarray] = []
         self._orders = self._constant_orders(remembered, places)
         self._begin, self._end = (self._orders[name].reshape(1) for name in ("begin", "end"))
@@ -151,10 +155,12 @@ class CompiledFlight:
         self._begin[0], self._end[0] = self._flown, end
         self._apply()
         self._flown = end
+        if 2 * self.told < end:
+            self.broken_off = interrupts.received[0]
 
     @property
     def told(self) -> int:
-        """The first period of the block in which a step effect has an event to tell.
+        """The first period of the block in which a step effect has an event to tell, or a signal.
 
         Nothing is known of it and of what follows. As many as the block has, where there is none.
         """
@@ -189,7 +195,7 @@ class CompiledFlight:
 
     def columns(self) -> Columns:
         """Return what the block has recorded so far, as views; without the law, if it has none."""
-        period, records = self._period, self._recorded[: self._flown // 2]
+        period, records = self._period, self._recorded[: min(self._flown // 2, self.told)]
         names = ("memory", "command", "applied", "wrench")
         groups: dict[str, dict[str, Array]] = {name: {} for name in names}
         recorded = (*period.before, *period.after, Recorded("saturated", "", period.saturated))
@@ -243,6 +249,7 @@ class CompiledFlight:
             table = np.ascontiguousarray(table)
             self._tables.append(table)  # keeps alive what the orders point to
             orders[name] = table.ctypes.data, len(table)
+        orders["received"] = interrupts.received.buffer_info()[0]
         orders["row"], orders["row_stride"] = self._rows.ctypes.data, self._rows.strides[0]
         orders["time"] = self._offset(period.time)
         orders["state_row"] = self._offset(period.physics)

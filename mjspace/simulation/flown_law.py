@@ -103,7 +103,7 @@ class FlownLaw:
         """
         try:
             returned = self._law.inner(self.state, time, command, measurement)
-        except Exception as error:
+        except BaseException as error:
             raise failure("the law's inner loop", error) from error
         check_inner(returned)
         self.state = _kept(returned[0])
@@ -141,7 +141,7 @@ def _called(method: Callable[..., Any], *arguments: Any) -> Any:
         return method(*arguments)
     except ReturnError:
         raise
-    except Exception as error:
+    except BaseException as error:
         raise failure("the law", error) from error
 
 

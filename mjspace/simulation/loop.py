@@ -10,6 +10,7 @@ from mujoco.batch import SimulationError
 
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError
+from mjspace.interrupts import Interrupted
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compiled_blocks import CompiledBlocks, stopped_at
 from mjspace.simulation.control_period import ControlPeriod
@@ -48,6 +49,7 @@ def fly(
 
     Raises:
         FlightError: the flight cannot go on; every good period has been yielded before.
+        Interrupted: a signal broke it off; likewise.
         InputError: an event of the scenario names no signal of this flight; nothing was yielded.
     """
     flight = _Flight(assembly, start, members, threads)
@@ -110,7 +112,7 @@ class _Flight:
 
     def record(
         self, first: int, last: int, stop: Callable[[], bool]
-    ) -> tuple[Columns, DesiredMotion, FlightError | None]:
+    ) -> tuple[Columns, DesiredMotion, FlightError | Interrupted | None]:
         """Fly a block of periods; return what it recorded, what was desired, and what ended it.
 
         Where the period can be compiled, its first is flown in Python, and proves the rest; and the
@@ -145,7 +147,7 @@ class _Flight:
         last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> tuple[Columns, ControlPeriod, FlightError | None]:
+    ) -> tuple[Columns, ControlPeriod, FlightError | Interrupted | None]:
         """Return what ``count`` periods recorded, the last of them, and what ended them.
 
         Raises:
@@ -153,7 +155,8 @@ class _Flight:
         """
         recording: Recording | None = None
         due = clock.monotonic() + BLOCK_SECONDS
-        now, trouble = first * self._control, None
+        now = first * self._control
+        trouble: FlightError | Interrupted | None = None
         try:
             # A law's infinities are found in what it commands, not in NumPy's warnings.
             with np.errstate(all="ignore"):
@@ -173,6 +176,10 @@ class _Flight:
             trouble = stopped_at(now, error)
             if recording is None:
                 raise trouble from trouble.__cause__
+        except Interrupted as error:
+            if recording is None:
+                raise
+            trouble = error
         raised = np.flatnonzero(self.stepper.batch.warning[:, :, 1].any(axis=0))
         if trouble is None and len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from mjspace import attitude
+from mjspace import attitude, interrupts
 from mjspace.contract import Array, Measurement
 from mjspace.environment.install import install_callbacks
 from mjspace.errors import FlightError, InputError, failure
+from mjspace.interrupts import Interrupted
 from mjspace.simulation import mujoco_warnings
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
@@ -25,6 +26,8 @@ InnerLoop = Callable[[float, Any, Measurement], Any]
 """Returns the motors' command of an integration step from (time [s], the law's command,
 measurement)."""
 
+STEPS_AT_ONCE = 1000
+"""Integration steps without a look at signals."""
 _LOCATED = (FlightError, InputError, SimulationError)
 """Errors that say themselves whose they are."""
 
@@ -153,6 +156,7 @@ class Stepper:
 
         Raises:
             FlightError, mujoco.batch.SimulationError: as ``begin``.
+            Interrupted: a signal was received within a long period.
         """
         step = 1
         while step < self._steps:
@@ -170,8 +174,15 @@ class Stepper:
                 step += 1
             else:
                 count = self._tick - step % self._tick
-                self.batch.step(nstep=count)
+                self._step(count)
                 step += count
+
+    def _step(self, count: int) -> None:
+        """Fly so many integration steps, unless a signal is received."""
+        for done in range(0, count, STEPS_AT_ONCE):
+            if interrupts.received[0]:
+                raise Interrupted(interrupts.received[0])
+            self.batch.step(nstep=min(STEPS_AT_ONCE, count - done))
 
     def _between(self, period: ControlPeriod, step: int, *, due: bool) -> Instant:
         """Return the instant between control instants at which that step of the period begins."""
@@ -243,5 +254,5 @@ def _of(effect: StepEffect, method: Callable[..., Any], *arguments: Any) -> Any:
         return method(*arguments)
     except _LOCATED:
         raise
-    except Exception as error:
+    except BaseException as error:
         raise failure(effect.name, error) from error

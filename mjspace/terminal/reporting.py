@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,15 +29,23 @@ def progress_bar(
 ) -> Iterator[Callable[[float], None]]:
     """Yield a function to call with the progress so far, of ``total``.
 
-    A bar is drawn after two seconds, where the output is a terminal.
+    A bar is drawn after two seconds, where the output is a terminal. A terminal that is closed
+    draws none, and stops nothing.
     """
     from tqdm import tqdm
 
     layout = "{desc} {percentage:3.0f}% |{bar}| " + count + "[{elapsed}<{remaining}]"
-    with tqdm(
-        total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout
-    ) as bar:
-        yield lambda reached: bar.update(reached - bar.n) and None
+    bar = tqdm(total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout)
+
+    def update(reached: float) -> None:
+        with suppress(OSError):
+            bar.update(reached - bar.n)
+
+    try:
+        yield update
+    finally:
+        with suppress(OSError):
+            bar.close()
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """The log of a flight against what flew: every topic against its own source, and their units."""
 
+import errno
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -229,9 +230,14 @@ def test_a_disk_that_fills_up_ends_the_flight_and_what_fitted_is_kept(
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("log")]
 
 
-def test_a_log_that_cannot_be_begun_ends_the_flight(tmp_path: Path) -> None:
-    (tmp_path / "flight.mcap").mkdir()
-    with pytest.raises(IsADirectoryError):
+def test_a_log_that_cannot_be_begun_ends_the_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr("mjspace.log.file.create", full)
+    with pytest.raises(OSError, match=r"No space left on device: .*flight\.mcap"):
         run("detumble-wheels", overrides=SHORT, out=tmp_path)
 
 
