@@ -39,9 +39,9 @@ ROOMS = {
     "actuators": (
         "constants contract environment errors gufunc scenario sensors signals units vehicle"
     ),
-    "log": "attitude contract scenario units",
+    "log": "attitude contract errors scenario units",
     "plotting": "contract log scenario signals units",
-    "rendering": "attitude contract environment errors log vehicle",
+    "rendering": "attitude contract environment errors log scenario vehicle",
     "simulation": (
         "actuators attitude contract environment errors scenario sensors signals tracing vehicle"
     ),

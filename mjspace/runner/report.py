@@ -110,7 +110,7 @@ def print_log(log: Log) -> None:
             listed.append(f"{name} {size}" + (f" [{units[name]}]" if name in units else ""))
         often = ""
         if log.every[topic] > 1:
-            often = f"every {log.every[topic] * float(log.metadata['control_period']):g} s: "
+            often = f"every {log.every[topic] * log.control_period:g} s: "
         table.add_row(topic, escape(often + ", ".join(listed)))
     table.add_row("attachments", ", ".join(sorted(log.attachments)))
     altered = log.altered()
