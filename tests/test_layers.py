@@ -49,7 +49,7 @@ ROOMS = {
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "attitude constants contract environment log plotting runner scenario vehicle",
-    "cli": "errors plotting rendering runner scenario simulation terminal validation",
+    "cli": "errors log plotting rendering runner scenario simulation terminal validation",
     "__main__": "cli",
 }
 # Outside packages that a few rooms alone may know.

@@ -107,7 +107,7 @@ def read_content(file: BinaryIO, place: ChunkPlace, channels: Collection[int]) -
             return Content(b"", {})
     data = unpacked(file, place)
     if place.indexes is None:
-        return Content(data, _walked(data, channels))
+        return Content(data, message_offsets(data, channels))
     offsets = {channel: _indexed(file, place.indexes[channel]) for channel in channels}
     for at in offsets.values():
         leads_out = len(at) and int(at[-1]) + HEADER.itemsize > len(data)
@@ -162,8 +162,12 @@ def _indexed(file: BinaryIO, position: int) -> NDArray[np.uint64]:
     return np.frombuffer(file.read(size), INDEX)["offset"]
 
 
-def _walked(data: bytes, channels: Collection[int]) -> dict[int, NDArray[np.uint64]]:
-    """Return the offsets of each channel's messages, found from record to record."""
+def message_offsets(data: bytes, channels: Collection[int]) -> dict[int, NDArray[np.uint64]]:
+    """Return the offsets of each channel's messages, found from record to record.
+
+    Raises:
+        ValueError: a record leads out of the chunk, or is too short for a message.
+    """
     offsets: dict[int, list[int]] = {channel: [] for channel in channels}
     for at, channel in messages(data):
         if channel in offsets:

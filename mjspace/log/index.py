@@ -49,10 +49,11 @@ class Inventory(NamedTuple):
     complete: bool
 
 
-class _Exactly(ReadDataStream):
+class Exactly(ReadDataStream):
     """What a record holds, which may claim more."""
 
     def read(self, length: int) -> bytes:
+        """Return the next bytes; EndOfFile where there are fewer."""
         data = super().read(length)
         if len(data) < length:
             raise EndOfFile
@@ -102,11 +103,11 @@ def _add(
     elif opcode == Opcode.CHUNK:
         found.chunks.append(ChunkPlace(position, length, *SPAN.unpack(file.read(SPAN.size)), {}))
     elif opcode == Opcode.SCHEMA:
-        schema = Schema.read(_Exactly(io.BytesIO(content(file, position, length))))
+        schema = Schema.read(Exactly(io.BytesIO(content(file, position, length))))
         if found.schemas.setdefault(schema.id, schema) != schema:
             raise ValueError(f"another schema has its number, {schema.id}")
     elif opcode == Opcode.CHANNEL:
-        declared = Channel.read(_Exactly(io.BytesIO(content(file, position, length))))
+        declared = Channel.read(Exactly(io.BytesIO(content(file, position, length))))
         if found.channels.setdefault(declared.topic, declared) != declared:
             raise ValueError("another channel is on its topic")
     elif opcode == Opcode.ATTACHMENT:
@@ -115,7 +116,7 @@ def _add(
             raise ValueError("another attachment has its name")
         found.attachments[name] = position, length
     elif opcode == Opcode.METADATA:
-        note = Metadata.read(_Exactly(io.BytesIO(content(file, position, length))))
+        note = Metadata.read(Exactly(io.BytesIO(content(file, position, length))))
         notes.add(note.name)
         if note.name == NAME:
             found.metadata.update(note.metadata)
@@ -180,7 +181,7 @@ def attachment(file: BinaryIO, position: int, length: int) -> Any:
         McapError, ValueError, struct.error: it is damaged, or too large.
     """
     data = content(file, position, length)
-    stream = _Exactly(io.BytesIO(data))
+    stream = Exactly(io.BytesIO(data))
     attached = Attachment.read(stream)
     checksum = int.from_bytes(data[-4:], "little")
     if stream.count != length or checksum not in (0, zlib.crc32(data[:-4])):

@@ -10,9 +10,9 @@ VARIABLE = "MJSPACE_UNPACK_LIMIT"
 MIB = 1 << 20
 MOST = 256 * MIB
 """Of a chunk, an attachment or another record. The chunk of a flight has 0.25 s of wall time."""
-FREE, RATIO = 16 * MIB, 1000
-"""What takes more than FREE has at most RATIO times the bytes that it is packed into: chunks of
-flights have 2 to 60 times as many."""
+FREE, RATIO = MIB // 16, 1000
+"""What takes more than FREE has at most RATIO times the bytes that it is packed into: the chunks of
+the scenarios' flights, of at most 2.3 MB, have up to 16 times as many."""
 ROW = MIB
 """Most bytes of a topic's row; a vehicle's have some thousand."""
 
