@@ -14,6 +14,9 @@ from mjspace.errors import InputError
 from mjspace.log.encoding import HEADER
 from mjspace.log.index import ChunkPlace
 
+CONTROL_PERIOD = "control_period"
+"""The key of the metadata that has the control period [s]."""
+
 
 def number(path: Path, metadata: Mapping[str, str], key: str, above: float) -> float:
     """Return the number that a log's ``metadata`` have.

@@ -22,6 +22,7 @@ RECORD = Struct("<BQ")
 """What a record begins with: opcode, length of the content that follows."""
 SPAN = Struct("<QQ")
 """What a chunk's content begins with: the span of its stamps [ns]."""
+_LONGEST_NAME = 4096  # bytes, of an attachment
 _INDEX_HEAD = Struct("<HI")  # of a MessageIndex: its channel, and the size of its entries
 
 
@@ -155,8 +156,8 @@ def attachment_name(file: BinaryIO, position: int, length: int) -> str:
     """
     file.seek(position + 16)
     size = int.from_bytes(file.read(4), "little")
-    if 20 + size > length or size > 4096:
-        raise ValueError("its name is not within it")
+    if 20 + size > length or size > _LONGEST_NAME:
+        raise ValueError("its name is not within it, or too long")
     return file.read(size).decode()
 
 
@@ -180,6 +181,7 @@ def attachment(file: BinaryIO, position: int, length: int) -> Any:
     Raises:
         McapError, ValueError, struct.error: it is damaged, or too large.
     """
+    attachment_name(file, position, length)
     data = content(file, position, length)
     stream = Exactly(io.BytesIO(data))
     attached = Attachment.read(stream)

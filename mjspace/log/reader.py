@@ -88,7 +88,7 @@ class Log:
     @property
     def control_period(self) -> float:
         """The control period of the flight [s]; InputError where the metadata lack it."""
-        return checked.number(self.path, self.metadata, "control_period", above=0.0)
+        return checked.number(self.path, self.metadata, checked.CONTROL_PERIOD, above=0.0)
 
     @property
     def member(self) -> int:
@@ -247,7 +247,7 @@ class Log:
         for rows in self._rows([topic], self._found.chunks):
             first = rows[topic]["header"][0]
             last = next(self._rows([topic], reversed(self._found.chunks)))[topic]["header"][-1]
-            if "control_period" in self.metadata:
+            if checked.CONTROL_PERIOD in self.metadata:
                 checked.span(self.path, topic, first, last, self.control_period)
             return first, last
         return None

@@ -1,5 +1,6 @@
 """What can be saved of a damaged log: every whole chunk, and what explains it, in a new file."""
 
+import math
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -10,10 +11,10 @@ from numpy.typing import NDArray
 
 from mjspace.errors import InputError, input_error_at
 from mjspace.log import digest
-from mjspace.log.checked import stamps
+from mjspace.log.checked import CONTROL_PERIOD, number, span, stamps
 from mjspace.log.chunk import INDEX, Part
 from mjspace.log.content import Content, message_offsets, unpacked
-from mjspace.log.encoding import HEADER, doubles
+from mjspace.log.encoding import HEADER, Fields, doubles
 from mjspace.log.file import NAME, LogFile
 from mjspace.log.index import ChunkPlace
 from mjspace.log.salvage import Salvage, salvage
@@ -33,24 +34,26 @@ class Recovered(NamedTuple):
     lost_spans: list[tuple[float, float]]
     """From the last control period before to the first after each gap [s]; inf: to the end."""
     lost_attachments: list[str]
+    lost_metadata: list[str]
+    """Keys that were left out because the rows contradict them."""
 
     @property
     def lost(self) -> str:
         """What was lost, in words; empty where nothing was."""
         spans = [
-            f"after {a:g} s" if b == np.inf else f"between {a:g} and {b:g} s"
+            f"after {a:g} s" if b == math.inf else f"between {a:g} and {b:g} s"
             for a, b in self.lost_spans
         ]
-        attachments = [f"attachment {name}" for name in self.lost_attachments]
-        count = [f"{self.lost_bytes:,} bytes"] if self.lost_bytes or spans or attachments else []
-        return ", ".join([*count, *spans, *attachments])
+        parts = [f"attachment {name}" for name in self.lost_attachments]
+        parts += [f"metadata {key}" for key in self.lost_metadata]
+        count = [f"{self.lost_bytes:,} bytes"] if self.lost_bytes or spans else []
+        return ", ".join([*count, *spans, *parts])
 
 
 class _Kept(NamedTuple):
     place: ChunkPlace
-    first: int
-    """Sequence number of the first control period; -1 where there is none."""
-    last: int
+    ends: tuple[np.void, np.void] | None
+    """Headers of the first and the last row of the topic that is logged most often."""
 
 
 def recover(path: Path, out: Path) -> Recovered:
@@ -67,9 +70,10 @@ def recover(path: Path, out: Path) -> Recovered:
         raise InputError(f"{out} exists: name a file that does not")
     with input_error_at("log"):
         found = salvage(path)
-    topics = {}
-    for topic, channel in found.channels.items():
-        if topic in PERIODIC:
+    topics: dict[str, tuple[Fields, dict[str, str], int]] = {}
+    for topic in PERIODIC:
+        if topic in found.channels:
+            channel = found.channels[topic]
             try:
                 topics[topic] = declared(channel, found.schemas.get(channel.schema_id))
             except ValueError as error:
@@ -78,8 +82,9 @@ def recover(path: Path, out: Path) -> Recovered:
     every = {found.channels[topic].id: every for topic, (*_, every) in topics.items()}
     most_often = min(every, key=every.__getitem__, default=-1)
     kept, lost_bytes = _in_order(path, found, dtypes, most_often)
-    if not kept or not any(one.last >= 0 for one in kept):
+    if not any(one.ends for one in kept):
         raise InputError(f"{path}: nothing of a flight can be saved: it has no whole chunk")
+    lost_metadata = _wrong_period(path, found, kept)
     result = Recovered(
         len(kept),
         min(one.place.start for one in kept) / 1e9,
@@ -88,6 +93,7 @@ def recover(path: Path, out: Path) -> Recovered:
         lost_bytes,
         _gaps(kept, every[most_often], found),
         sorted(found.expected_attachments - found.attachments.keys()),
+        lost_metadata,
     )
     _write(path, out, found, kept, result)
     return result
@@ -120,31 +126,48 @@ def _in_order(
             if not content.channels:
                 continue
             last |= {channel: int(header["log_time"][-1]) for channel, header in headers.items()}
-            periods = headers[most_often]["sequence"] if most_often in headers else [-1]
-            kept.append(_Kept(place, int(periods[0]), int(periods[-1])))
+            rows = headers.get(most_often)
+            kept.append(_Kept(place, None if rows is None else (rows[0].copy(), rows[-1].copy())))
     return kept, lost
+
+
+def _wrong_period(path: Path, found: Salvage, kept: list[_Kept]) -> list[str]:
+    """Return the metadata's key of the control period where it does not fit the ``kept`` rows."""
+    metadata = found.metadata.get(NAME, {})
+    if CONTROL_PERIOD not in metadata:
+        return []
+    ends = [one.ends for one in kept if one.ends]
+    try:
+        period = number(path, metadata, CONTROL_PERIOD, above=0.0)
+        span(path, "", ends[0][0], ends[-1][1], period)
+    except InputError:
+        return [CONTROL_PERIOD]
+    return []
 
 
 def _gaps(kept: list[_Kept], every: int, found: Salvage) -> list[tuple[float, float]]:
     """Return where control periods are missing between the ``kept`` chunks, and after them."""
-    flown = [one for one in kept if one.last >= 0]
-    gaps = [] if flown[0].first == 0 else [(0.0, flown[0].place.start / 1e9)]
-    for before, after in pairwise(flown):
-        if after.first > before.last + every:
-            gaps.append((before.place.end / 1e9, after.place.start / 1e9))
+    flown = [one.ends for one in kept if one.ends]
+    begin, end = flown[0][0], flown[-1][1]
+    gaps = [(0.0, begin["log_time"] / 1e9)] if begin["sequence"] else []
+    for (_, before), (after, _) in pairwise(flown):
+        if int(after["sequence"]) > int(before["sequence"]) + every:
+            gaps.append((before["log_time"] / 1e9, after["log_time"] / 1e9))
     if found.lost_at_end:
-        gaps.append((flown[-1].place.end / 1e9, np.inf))
+        gaps.append((end["log_time"] / 1e9, math.inf))
     return gaps
 
 
 def _write(path: Path, out: Path, found: Salvage, kept: list[_Kept], result: Recovered) -> None:
-    note = {"recovered": f"lost {result.lost}"} if result.lost else {}
     notes = dict(found.metadata)
+    own = {k: v for k, v in notes.pop(NAME, {}).items() if k not in result.lost_metadata}
+    if result.lost:
+        own["recovered"] = f"lost {result.lost}"
     log = LogFile(
         out,
         list(found.schemas.values()),
         list(found.channels.values()),
-        notes.pop(NAME, {}) | note,
+        own,
         found.attachments,
     )
     try:

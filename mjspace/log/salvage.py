@@ -104,6 +104,9 @@ class _Search:
             found.attachments.setdefault(one.name, (one.media_type, one.data))
         elif opcode in _SMALL:
             self._declare(opcode, content(file, position, length))
+        elif opcode == Opcode.MESSAGE_INDEX:
+            if int.from_bytes(self._mapped[position + 2 : position + 6], "little") + 6 != length:
+                raise ValueError("its length is not that of its entries")
         elif opcode > Opcode.DATA_END or not self._is_record(position + length):
             raise ValueError("no record of MCAP")
 

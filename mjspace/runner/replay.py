@@ -23,7 +23,7 @@ from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.simulation.initial_state import Start, start_at, state_of_log
+from mjspace.simulation.initial_state import Start, first_start, start_at, state_of_log
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block, Rows, one_vehicle, shapes
 from mjspace.simulation.user_code import reference_at
@@ -110,6 +110,12 @@ def verify(
         )
     with assembly_of(log) as assembly:
         begin = start_of(log, assembly, start)
+        if begin.period == 0:
+            expected = {"physics": first_start(assembly, [log.member]).physics}
+            logged = {"time": np.zeros(1), "physics": begin.physics}
+            found = first_difference({"/state": logged}, {"/state": expected})
+            if found is not None:
+                return dataclasses.replace(found, reason="the scenario begins otherwise")
         for block in fly(assembly, begin, [log.member]):
             flown = as_logged(one_vehicle(block), log.topics)
             _check_topics(log, block)
