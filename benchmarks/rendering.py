@@ -6,6 +6,7 @@ has neither caption nor desired axes, its states are in memory, and it has to be
 a display, as ours has not.
 """
 
+import gzip
 import sys
 import tempfile
 from functools import partial
@@ -20,7 +21,7 @@ from mjspace.log.reader import Log
 from mjspace.rendering.render import render
 from mjspace.rendering.scene import AXES
 from mjspace.rendering.video import Video
-from mjspace.vehicle.vehicle import from_bytes
+from mjspace.vehicle.vehicle import from_mjb
 
 SIZE, RATE = (960, 540), 25.0
 
@@ -48,7 +49,7 @@ def bare_loop(log: Log, output: Path) -> Run:
     compressed = log.attachment("model.mjb.gz")
 
     def run() -> None:
-        model = from_bytes(compressed)
+        model = from_mjb(gzip.decompress(compressed))
         data, option = mujoco.MjData(model), mujoco.MjvOption()
         option.geomgroup[AXES] = 1
         width, height = SIZE

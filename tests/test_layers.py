@@ -39,9 +39,9 @@ ROOMS = {
     "environment": "contract scenario vehicle",
     "sensors": "attitude contract gufunc scenario units",
     "actuators": ("contract environment errors gufunc scenario sensors signals units vehicle"),
-    "log": "attitude contract scenario units",
+    "log": "attitude contract errors scenario units",
     "plotting": "contract errors log scenario signals units",
-    "rendering": "attitude contract environment errors log vehicle",
+    "rendering": "attitude contract environment errors log scenario vehicle",
     "simulation": (
         "actuators attitude contract environment errors interrupts scenario sensors signals "
         "tracing vehicle"
@@ -50,7 +50,7 @@ ROOMS = {
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "attitude contract environment log plotting runner scenario vehicle",
-    "cli": "errors plotting rendering runner scenario simulation terminal validation",
+    "cli": "errors log plotting rendering runner scenario simulation terminal validation",
     "__main__": "cli interrupts",
 }
 # Outside packages that a few rooms alone may know.

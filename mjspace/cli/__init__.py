@@ -1,7 +1,8 @@
 """The command line: ``list``, ``info``, ``run``, ``replay``, ``render``, ``plot``, ``validate``.
 
-Exit status: 0 every check came out as the scenario expects, 1 flown but one did not (or a replay
-differed, or the flight ended early), 2 bad input. Modules are imported when a command needs them:
+``recover`` saves what is whole of a damaged log. Exit status: 0 every check came out as the
+scenario expects, 1 flown but one did not (or a replay differed, or the flight ended early), 2 bad
+input. Modules are imported when a command needs them:
 ``--help`` answers at once.
 """
 
@@ -10,7 +11,7 @@ import warnings
 
 import typer
 
-from mjspace.cli import flights, pictures, scenarios, validation
+from mjspace.cli import flights, pictures, recovery, scenarios, validation
 from mjspace.errors import print_warning
 from mjspace.rendering import graphics
 from mjspace.terminal.reporting import report_errors
@@ -28,6 +29,7 @@ app.command()(flights.run)
 app.command()(flights.replay)
 app.command()(pictures.render)
 app.command()(pictures.plot)
+app.command()(recovery.recover)
 app.command()(validation.validate)
 
 

@@ -1,20 +1,22 @@
 """A chunk of a log read back: decompressed once, its messages as bytes or as rows of numbers."""
 
+import zlib
 from collections.abc import Collection, Iterator, Mapping
 from struct import Struct
 from typing import Any, BinaryIO
 
 import numpy as np
 import zstandard
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Chunk
 from numpy.typing import NDArray
 
 from mjspace.log.chunk import INDEX
+from mjspace.log.encoding import HEADER
 from mjspace.log.index import RECORD, ChunkPlace
+from mjspace.log.limits import refuse_bomb
 
-_MESSAGE = Struct("<BQH")  # opcode, length of the content that follows, channel
+_CHUNK = Struct("<QQQII")
+"""What a chunk begins with: span of stamps, size and checksum of its records, length of a name."""
 
 
 class Content:
@@ -31,13 +33,23 @@ class Content:
         return [channel for channel, offsets in self._offsets.items() if len(offsets)]
 
     def records(self, channel: int) -> list[bytes]:
-        """Return the channel's Message records, each record whole."""
-        data = self._data
-        lengths = ((at, RECORD.unpack_from(data, at)[1]) for at in self._offsets[channel].tolist())
-        return [data[at : at + RECORD.size + length] for at, length in lengths]
+        """Return the channel's Message records, each record whole.
+
+        Raises:
+            ValueError: one leads into the next, or out of the chunk.
+        """
+        data, begins = self._data, self._offsets[channel].tolist()
+        ends = [at + RECORD.size + RECORD.unpack_from(data, at)[1] for at in begins]
+        if any(end > limit for end, limit in zip(ends, [*begins[1:], len(data)], strict=True)):
+            raise ValueError("a record leads out of its place")
+        return [data[at:end] for at, end in zip(begins, ends, strict=True)]
 
     def tails(self, channel: int, start: int) -> Any:
-        """Return the channel's records one after the other, each from its byte ``start`` on."""
+        """Return the channel's records one after the other, each from its byte ``start`` on.
+
+        Raises:
+            ValueError: a record leads into the next, or out of the chunk.
+        """
         first = int(self._offsets[channel][0])
         try:
             records = self._equal(channel, RECORD.size + RECORD.unpack_from(self._data, first)[1])
@@ -49,9 +61,12 @@ class Content:
         """Return the channel's records as rows of ``dtype``, shape (n,); n > 0.
 
         Raises:
-            ValueError: a record of another length.
+            ValueError: a record of another length, of another channel or of another kind.
         """
         rows: NDArray[np.void] = self._equal(channel, dtype.itemsize).view(dtype)[:, 0]
+        header = rows["header"]
+        if (header["opcode"] != Opcode.MESSAGE).any() or (header["channel"] != channel).any():
+            raise ValueError("the index leads to something else")
         return rows
 
     def _equal(self, channel: int, size: int) -> NDArray[np.uint8]:
@@ -66,6 +81,8 @@ class Content:
         if offsets.max() + size > len(self._data):
             raise ValueError("a record leads out of its chunk")
         steps = set(np.diff(offsets).tolist()) or {size}
+        if min(steps) < size:
+            raise ValueError("a record of another length")
         if len(steps) == 1:
             shape, strides = (len(offsets), size), (*steps, 1)
             found = np.ndarray(shape, np.uint8, self._data, int(offsets[0]), strides)
@@ -88,45 +105,101 @@ def read_content(file: BinaryIO, place: ChunkPlace, channels: Collection[int]) -
         channels = [channel for channel in channels if channel in place.indexes]
         if not channels:
             return Content(b"", {})
-    file.seek(place.position)
-    chunk = Chunk.read(ReadDataStream(file))
-    if chunk.compression not in ("", "zstd"):
-        raise ValueError(f"compression {chunk.compression!r}: write the log anew with zstd")
-    data = chunk.data
-    if chunk.compression:
-        try:
-            data = zstandard.decompress(data, max_output_size=chunk.uncompressed_size)
-        except zstandard.ZstdError as error:
-            raise ValueError(f"the chunk at byte {place.position} is damaged: {error}") from None
+    data = unpacked(file, place)
     if place.indexes is None:
-        return Content(data, _walked(data, channels))
+        return Content(data, message_offsets(data, channels))
     offsets = {channel: _indexed(file, place.indexes[channel]) for channel in channels}
-    if any(int(at.max()) + RECORD.size > len(data) for at in offsets.values() if len(at)):
-        raise ValueError(f"the index of the chunk at byte {place.position} is damaged")
+    for at in offsets.values():
+        leads_out = len(at) and int(at[-1]) + HEADER.itemsize > len(data)
+        if leads_out or (at[1:] <= at[:-1]).any():
+            raise ValueError("its index is damaged")
     return Content(data, offsets)
+
+
+def unpacked(file: BinaryIO, place: ChunkPlace) -> bytes:
+    """Return the records in a chunk.
+
+    Raises:
+        ValueError: the chunk is damaged, or compressed by another method than zstd.
+    """
+    file.seek(place.position)
+    head = file.read(min(_CHUNK.size, place.size))
+    if len(head) < _CHUNK.size:
+        raise ValueError("it is too short")
+    *_, size, checksum, length = _CHUNK.unpack(head)
+    method = file.read(min(length, place.size - _CHUNK.size))
+    packed = place.size - _CHUNK.size - len(method) - 8
+    if method not in (b"", b"zstd"):
+        name = method[:20].decode(errors="replace")
+        raise ValueError(f"compression {name!r}: write the log anew with zstd")
+    if packed < 0 or int.from_bytes(file.read(8), "little") != packed:
+        raise ValueError("its length is not that of its records")
+    refuse_bomb(packed, packed)
+    data = file.read(packed)
+    if not method:
+        if packed != size or checksum not in (0, zlib.crc32(data)):
+            raise ValueError("its checksum is wrong")
+        return data
+    refuse_bomb(size, packed)
+    try:
+        claimed = zstandard.frame_content_size(data)
+        if claimed not in (-1, size):
+            raise ValueError("its two sizes differ")
+        data = zstandard.decompress(data, max_output_size=size)
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from None
+    if len(data) != size:
+        raise ValueError("it unpacks to another size")
+    return data
 
 
 def _indexed(file: BinaryIO, position: int) -> NDArray[np.uint64]:
     """Return the offsets in the MessageIndex whose content is at ``position``."""
     file.seek(position + 2)
     size = int.from_bytes(file.read(4), "little")
+    if size % INDEX.itemsize:
+        raise ValueError("its index is damaged")
     return np.frombuffer(file.read(size), INDEX)["offset"]
 
 
-def _walked(data: bytes, channels: Collection[int]) -> dict[int, NDArray[np.uint64]]:
-    """Return the offsets of each channel's messages, found from record to record."""
+def message_offsets(data: bytes, channels: Collection[int]) -> dict[int, NDArray[np.uint64]]:
+    """Return the offsets of each channel's messages, found from record to record.
+
+    Raises:
+        ValueError: a record leads out of the chunk, or is too short for a message.
+    """
     offsets: dict[int, list[int]] = {channel: [] for channel in channels}
-    for at, channel in _messages(data):
+    for at, channel in messages(data):
         if channel in offsets:
             offsets[channel].append(at)
     return {channel: np.array(places, np.uint64) for channel, places in offsets.items()}
 
 
-def _messages(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yield where each message of a chunk's content is, and its channel."""
+def messages(data: bytes) -> Iterator[tuple[int, int]]:
+    """Yield where each message of a chunk's content is, and its channel.
+
+    Raises:
+        ValueError: a record leads out of the chunk, or is too short for a message.
+    """
+    for opcode, at, length in records(data):
+        if opcode == Opcode.MESSAGE:
+            if length < HEADER.itemsize - RECORD.size:
+                raise ValueError("it holds a message that is too short")
+            yield at, int.from_bytes(data[at + RECORD.size : at + RECORD.size + 2], "little")
+
+
+def records(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield the opcode of each record of a chunk's content, where it begins, and its length.
+
+    Raises:
+        ValueError: a record leads out of the chunk.
+    """
     at = 0
     while at < len(data):
-        opcode, length, channel = _MESSAGE.unpack_from(data, at)
-        if opcode == Opcode.MESSAGE:
-            yield at, channel
+        if at + RECORD.size > len(data):
+            raise ValueError("its last record is not whole")
+        opcode, length = RECORD.unpack_from(data, at)
+        if at + RECORD.size + length > len(data):
+            raise ValueError("a record leads out of it")
+        yield opcode, at, length
         at += RECORD.size + length

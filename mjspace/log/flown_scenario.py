@@ -1,5 +1,6 @@
 """The scenario that a log says was flown."""
 
+from mjspace.errors import input_error_at
 from mjspace.log.reader import Log
 from mjspace.scenario import raw
 from mjspace.scenario.loading import validate
@@ -10,8 +11,10 @@ def scenario_of(log: Log) -> Scenario:
     """Return the scenario as flown, with every default and gain written out.
 
     Raises:
-        ValueError: the log does not hold it, or it is not valid for this version of mjspace.
+        InputError: the log does not hold it, or it is not valid for this version of mjspace.
     """
-    table = raw.parsed(log.attachment("scenario.toml").decode())
+    text = log.attachment("scenario.toml")
+    with input_error_at(f"{log.path}: the attachment 'scenario.toml'"):
+        table = raw.parsed(text.decode())
     table.pop("verdict", None)  # of logs from before checks said how they are expected to come out
     return validate(table, f"the scenario in {log.path}", context={"flown": True})

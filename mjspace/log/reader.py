@@ -2,20 +2,21 @@
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from foxglove_schemas_protobuf.Log_pb2 import Log as LogMessage
 from numpy.typing import NDArray
 
 from mjspace.contract import Array, Event
-from mjspace.log import digest
+from mjspace.errors import InputError
+from mjspace.log import checked, digest
 from mjspace.log.content import Content, read_content
-from mjspace.log.encoding import HEADER, doubles
+from mjspace.log.encoding import doubles
 from mjspace.log.index import ChunkPlace, inventory, read_attachment
-from mjspace.log.schema import PERIODIC, field_names
+from mjspace.log.schema import PERIODIC, declared
 
 
 class Log:
@@ -32,7 +33,7 @@ class Log:
 
         Raises:
             OSError: the file cannot be read.
-            ValueError: it is not an MCAP file, or not a log of mjspace.
+            InputError: it is not an MCAP file, not a log of mjspace, or damaged.
         """
         self.path = Path(path)
         self._found = found = inventory(self.path)
@@ -41,19 +42,17 @@ class Log:
         self.topics: dict[str, dict[str, tuple[int, ...]]] = {}
         self.units: dict[str, dict[str, str]] = {}
         self.every: dict[str, int] = {}
+        self._dtypes: dict[str, np.dtype[np.void]] = {}
         for topic in PERIODIC:
             if topic in found.channels:
                 channel = found.channels[topic]
-                self.every[topic] = int(channel.metadata.get("every", 1))
-                names = field_names(found.schemas[channel.schema_id].data)
-                self.topics[topic] = {
-                    name: tuple(
-                        int(size) for size in channel.metadata[f"shape.{name}"].split(",") if size
-                    )
-                    for name in names
-                }
-                units = {name: channel.metadata.get(f"unit.{name}", "") for name in names}
-                self.units[topic] = {name: unit for name, unit in units.items() if unit}
+                try:
+                    shapes, units, every = declared(channel, found.schemas.get(channel.schema_id))
+                    self._dtypes[topic] = doubles(shapes).record(0).dtype
+                except ValueError as error:
+                    message = f"{path}: {topic} is not as mjspace logs it: {error}"
+                    raise InputError(message) from error
+                self.topics[topic], self.units[topic], self.every[topic] = shapes, units, every
 
     @classmethod
     def of(cls, log: "Log | Path | str") -> "Log":
@@ -61,7 +60,7 @@ class Log:
 
         Raises:
             OSError: the file cannot be read.
-            ValueError: it is not an MCAP file, or not a log of mjspace.
+            InputError: it is not an MCAP file, not a log of mjspace, or damaged.
         """
         return log if isinstance(log, Log) else cls(log)
 
@@ -74,12 +73,27 @@ class Log:
         """Return an attachment's content.
 
         Raises:
-            ValueError: there is none of that name.
+            InputError: there is none of that name.
         """
         if name not in self._found.attachments:
             have = ", ".join(self.attachments) or "none"
-            raise ValueError(f"no attachment {name!r} in {self.path}: have {have}")
-        return read_attachment(self.path, self._found.attachments[name])
+            raise InputError(f"no attachment {name!r} in {self.path}: have {have}")
+        return read_attachment(self.path, name, *self._found.attachments[name])
+
+    def shape(self, topic: str, field: str) -> tuple[int, ...]:
+        """Return a field's shape; InputError where the log lacks it."""
+        self._fields(topic, [field])
+        return self.topics[topic][field]
+
+    @property
+    def control_period(self) -> float:
+        """The control period of the flight [s]; InputError where the metadata lack it."""
+        return checked.number(self.path, self.metadata, checked.CONTROL_PERIOD, above=0.0)
+
+    @property
+    def member(self) -> int:
+        """The number of the vehicle in its campaign; InputError where the metadata lack it."""
+        return int(checked.number(self.path, self.metadata, "member", above=-1.0))
 
     def __len__(self) -> int:
         """Return the number of control periods."""
@@ -109,7 +123,7 @@ class Log:
         ``every``-th after it.
 
         Raises:
-            ValueError: the log has no such topic or field, or a chunk is damaged.
+            InputError: the log has no such topic or field, or a chunk is damaged.
         """
         for found in self.blocks_of_topics({topic: fields}, start, end, every):
             yield found[topic]
@@ -126,17 +140,21 @@ class Log:
         ``fields`` are by topic, None for all of it. A chunk without rows of a topic lacks it.
 
         Raises:
-            ValueError: the log has no such topic or field, or a chunk is damaged.
+            InputError: the log has no such topic or field, or a chunk is damaged.
         """
         names = {topic: self._fields(topic, chosen) for topic, chosen in fields.items()}
         first = 0 if start is None else max(round(start * 1e9), 0)
         stop = 2**63 if end is None else max(round(end * 1e9) + 1, 0)
         places = [c for c in self._found.chunks if c.end >= first and c.start < stop]
-        skip = dict.fromkeys(names, 0)
+        skip, last = dict.fromkeys(names, 0), dict.fromkeys(names, -1)
         for content in self._rows(names, places):
             found = {}
             for topic, rows in content.items():
                 stamps = rows["header"]["log_time"]
+                if int(stamps[0]) <= last[topic]:
+                    at = f"after t = {last[topic] / 1e9:g} s"
+                    raise InputError(f"{self.path}: {topic} is damaged {at}: time does not go on")
+                last[topic] = int(stamps[-1])
                 low, high = np.searchsorted(stamps, np.array([first, stop], np.uint64))
                 if low + skip[topic] < high:
                     chosen = rows[low + skip[topic] : high : every]
@@ -174,7 +192,7 @@ class Log:
         """Return the row of a topic nearest to ``time`` [s]: ``time``, shape (), and every field.
 
         Raises:
-            ValueError: the log has no such topic, no row, or a damaged chunk.
+            InputError: the log has no such topic, no row, or a damaged chunk.
         """
         names = self._fields(topic, None)
         channel, stamp = self._found.channels[topic].id, round(time * 1e9)
@@ -184,7 +202,7 @@ class Log:
         after = bisect_right(places, stamp, key=lambda place: place.start)
         found = [rows[topic] for rows in self._rows([topic], places[max(after - 2, 0) : after + 1])]
         if not found:
-            raise ValueError(f"{self.path} holds nothing on {topic} near {time:g} s")
+            raise InputError(f"{self.path} holds nothing on {topic} near {time:g} s")
         rows = np.concatenate(found)
         best = np.abs(rows["header"]["log_time"].astype(np.int64) - stamp).argmin()
         return _columns(rows[best], names)
@@ -195,7 +213,7 @@ class Log:
         None: not known, as of a log that was cut short.
 
         Raises:
-            ValueError: a chunk is damaged.
+            InputError: a chunk is damaged.
         """
         if not (self.complete and self._found.digests):
             return None
@@ -208,14 +226,17 @@ class Log:
         return [topic for topic in written | now if now.get(topic) != written.get(topic)]
 
     def events(self) -> list[Event]:
-        """Return the entries of /events, in the order in which they were logged."""
+        """Return the entries of /events, in the order in which they were logged.
+
+        Raises:
+            InputError: a chunk or an entry is damaged.
+        """
         events = []
         for content in self._contents(self._topics_of(["/events"]), self._found.chunks):
             for channel in content.channels:
-                for record in content.records(channel):
-                    entry = LogMessage.FromString(record[HEADER.itemsize :])
-                    time = entry.timestamp.ToNanoseconds() / 1e9
-                    events.append(Event(time, 0, LogMessage.Level.Name(entry.level), entry.message))
+                with self._damage_of("/events"):
+                    entries = [checked.event(record) for record in content.records(channel)]
+                events += entries
         return events
 
     @cached_property
@@ -223,20 +244,23 @@ class Log:
         """Headers of the first and the last control period."""
         # Of the topic that is logged most often: a log that was cut short ends with a row of that.
         topic = min(self.every, key=self.every.__getitem__, default="/state")
-        for first in self._rows([topic], self._found.chunks):
-            last = next(self._rows([topic], reversed(self._found.chunks)))
-            return first[topic]["header"][0], last[topic]["header"][-1]
+        for rows in self._rows([topic], self._found.chunks):
+            first = rows[topic]["header"][0]
+            last = next(self._rows([topic], reversed(self._found.chunks)))[topic]["header"][-1]
+            if checked.CONTROL_PERIOD in self.metadata:
+                checked.span(self.path, topic, first, last, self.control_period)
+            return first, last
         return None
 
     def require_periods(self) -> None:
         """Make sure that the log holds something of a flight.
 
         Raises:
-            ValueError: it was cut short before its first chunk, or has no control period at all.
+            InputError: it was cut short before its first chunk, or has no control period at all.
         """
         if self._ends is None:
             cut = "" if self.complete else " was cut short before its first chunk: it"
-            raise ValueError(f"{self.path}{cut} holds no control period")
+            raise InputError(f"{self.path}{cut} holds no control period")
 
     @property
     def _some_ends(self) -> tuple[np.void, np.void]:
@@ -246,11 +270,11 @@ class Log:
 
     def _fields(self, topic: str, fields: Sequence[str] | None) -> Sequence[str]:
         if topic not in self.topics:
-            raise ValueError(f"no topic {topic!r} in {self.path}: have {', '.join(self.topics)}")
+            raise InputError(f"no topic {topic!r} in {self.path}: have {', '.join(self.topics)}")
         known = self.topics[topic]
         for name in fields or ():
             if name not in known:
-                raise ValueError(
+                raise InputError(
                     f"no field {name!r} on {topic} in {self.path}: have {', '.join(known)}"
                 )
         return list(known) if fields is None else fields
@@ -268,18 +292,14 @@ class Log:
         self, topics: Iterable[str], places: Iterable[ChunkPlace]
     ) -> Iterator[dict[str, NDArray[np.void]]]:
         """Yield the rows that each of ``places`` has on periodic topics, where it has any."""
-        channels = self._topics_of(topics)
-        dtypes = {c: doubles(self.topics[topic]).record(0).dtype for c, topic in channels.items()}
-        for content in self._contents(channels, places):
+        channels, places = self._topics_of(topics), list(places)
+        for place, content in zip(places, self._contents(channels, places), strict=True):
             found = {}
             for channel in content.channels:
                 topic = channels[channel]
-                try:
-                    found[topic] = content.rows(channel, dtypes[channel])
-                except ValueError as error:
-                    raise ValueError(
-                        f"{self.path}: {topic} is not laid out as mjspace writes it: {error}"
-                    ) from None
+                with self._damage_of(topic):
+                    found[topic] = content.rows(channel, self._dtypes[topic])
+                    checked.stamps(found[topic]["header"]["log_time"], place)
             if found:
                 yield found
 
@@ -290,9 +310,28 @@ class Log:
         with self.path.open("rb") as file:
             for place in places:
                 try:
-                    yield read_content(file, place, channels)
+                    content = read_content(file, place, channels)
                 except ValueError as error:
-                    raise ValueError(f"{self.path}: {error}") from None
+                    raise InputError(self._damaged(place, error)) from error
+                yield content
+
+    def _damaged(self, place: ChunkPlace, error: Exception) -> str:
+        count, before = len(self._found.chunks), self._found.chunks.index(place)
+        return (
+            f"{self.path}: the chunk at byte {place.position} cannot be read: {error}; it is "
+            f"number {before + 1} of {count}, from t = {place.start / 1e9:g} s: 'mjspace recover' "
+            "writes what can be saved"
+        )
+
+    @contextmanager
+    def _damage_of(self, topic: str) -> Iterator[None]:
+        """Turn a ValueError of reading ``topic`` into an InputError that names it."""
+        try:
+            yield
+        except ValueError as error:
+            raise InputError(
+                f"{self.path}: {topic} is not laid out as mjspace writes it: {error}"
+            ) from error
 
     def _topics_of(self, topics: Iterable[str]) -> dict[int, str]:
         """Return those of ``topics`` that the log has, by their channels."""

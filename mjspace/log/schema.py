@@ -1,6 +1,7 @@
 """What the log holds: its topics, with the schemas that explain them to any reader."""
 
 from collections.abc import Mapping
+from math import prod
 from typing import Any, NamedTuple
 
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -12,9 +13,11 @@ from google.protobuf.descriptor_pb2 import (
     FileDescriptorProto,
     FileDescriptorSet,
 )
+from google.protobuf.message import DecodeError
 from mcap.records import Channel, Schema
 
 from mjspace.log.encoding import Fields
+from mjspace.log.limits import ROW
 from mjspace.units import Unit
 
 PERIODIC = {
@@ -115,7 +118,58 @@ def _descriptor_of(file: FileDescriptor) -> bytes:
     return FileDescriptorSet(file=found.values()).SerializeToString()
 
 
-def field_names(schema: bytes) -> list[str]:
-    """Return the field names of a FileDescriptorSet's one message, in their numbers' order."""
-    message = FileDescriptorSet.FromString(schema).file[0].message_type[0]
-    return [field.name for field in sorted(message.field, key=lambda field: field.number)]
+def declared(channel: Channel, schema: Schema | None) -> tuple[Fields, dict[str, str], int]:
+    """Return what a periodic channel of a log declares: shapes, units, ``every``.
+
+    Raises:
+        ValueError: it is not declared as mjspace does.
+    """
+    name = PERIODIC[channel.topic]
+    found = None if schema is None else (channel.message_encoding, schema.encoding, schema.name)
+    if schema is None or found != ("protobuf", "protobuf", name):
+        has = "none" if found is None else ", ".join(map(repr, found))
+        raise ValueError(f"its message is not {name} in protobuf, but {has:.80}")
+    every = _natural(channel.metadata.get("every", "1"), "every")
+    if every == 0:
+        raise ValueError("its metadata have every = 0, should be at least 1")
+    shapes = {field: _shape(channel, field) for field in _field_names(schema, name)}
+    size = sum(8 * prod(shape) for shape in shapes.values())
+    if size > ROW:
+        raise ValueError(f"its row has {size} bytes, more than {ROW}")
+    units = {field: channel.metadata.get(f"unit.{field}", "") for field in shapes}
+    return shapes, {field: unit for field, unit in units.items() if unit}, every
+
+
+def _shape(channel: Channel, field: str) -> tuple[int, ...]:
+    sizes = channel.metadata.get(f"shape.{field}")
+    if sizes is None:
+        raise ValueError(f"its metadata lack shape.{field}")
+    return tuple(_natural(size, f"shape.{field}") for size in sizes.split(",") if size)
+
+
+def _natural(text: str, key: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise ValueError(f"its metadata have {key} = {text[:20]!r}, not a whole number")
+    return int(text)
+
+
+def _field_names(schema: Schema, name: str) -> list[str]:
+    """Return the names of the fields of a message of doubles, numbered from 1 in their order.
+
+    Raises:
+        ValueError: the schema is not a FileDescriptorSet of such a message.
+    """
+    try:
+        files = FileDescriptorSet.FromString(schema.data).file
+    except DecodeError:
+        files = []
+    kinds = [kind for file in files for kind in file.message_type]
+    fields = sorted(kinds[0].field, key=lambda field: field.number) if len(kinds) == 1 else []
+    good = len(kinds) == 1 and all(
+        field.number == number and field.type == FieldDescriptorProto.TYPE_DOUBLE
+        for number, field in enumerate(fields, start=1)
+    )
+    names = [field.name for field in fields]
+    if not good or len(set(names)) < len(names):
+        raise ValueError(f"its schema {name} is not a message of numbers")
+    return names

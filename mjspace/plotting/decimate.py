@@ -32,7 +32,7 @@ def outlines(log: Log, lines: Sequence[Line], points: int = POINTS) -> list[tupl
     Raises:
         ValueError: the log has no such topic or field, or no row of it.
     """
-    periods = round((log.end - log.start) / float(log.metadata["control_period"])) + 1
+    periods = round((log.end - log.start) / log.control_period) + 1
     # Two points for each stretch, in their order: a stretch of two rows is those two.
     drawn = [
         _Outline(line, max(2, math.ceil(2 * periods / (points * log.every[line.topic]))))

@@ -1,5 +1,6 @@
 """Renders a log as a video or a picture: its model in the logged states."""
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from itertools import repeat
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from mjspace.contract import Array
+from mjspace.environment.install import userdata_size
 from mjspace.errors import whole_or_none
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
@@ -16,7 +18,9 @@ from mjspace.rendering import overlay
 from mjspace.rendering.offscreen import Canvas
 from mjspace.rendering.scene import Stage
 from mjspace.rendering.video import Frame, Video
-from mjspace.vehicle.vehicle import from_bytes
+from mjspace.scenario.scenario import Scenario
+from mjspace.vehicle.logged_model import logged_model
+from mjspace.vehicle.vehicle import build
 
 _LARGEST = 8192  # pixels: 2 GB of buffers, and every renderer has them
 _MOST_FRAMES = 1_000_000
@@ -82,8 +86,8 @@ def nearest_rows(log: Log, topic: str, field: str, times: Array) -> Iterator[Arr
     Raises:
         ValueError: the log does not have the topic or field, or no row near the times.
     """
-    margin = float(log.metadata["control_period"]) * log.every[topic]
-    stamps, rows, done = np.empty(0), np.empty((0, *log.topics[topic][field])), 0
+    margin = log.control_period * log.every[topic]
+    stamps, rows, done = np.empty(0), np.empty((0, *log.shape(topic, field))), 0
     start, end = max(times[0] - margin, 0.0), times[-1] + margin
     for block in log.blocks(topic, [field], start=start, end=end):
         # The last row so far may be nearer to a time than the first one of this block.
@@ -109,7 +113,7 @@ def _still_time(log: Log, at: float | None) -> float:
 
 def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Iterator[Frame]:
     scenario = scenario_of(log)
-    stage = Stage(from_bytes(log.attachment("model.mjb.gz")), camera, scenario.environment.orbit)
+    stage = Stage(_model(log, scenario), camera, scenario.environment.orbit)
     left = scenario.name, scenario.law.kind
     pulses: Iterable[Array | None] = repeat(None, len(times))
     if "on_time" in log.topics.get("/command", {}):
@@ -130,6 +134,15 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
             yield frame
 
 
+def _model(log: Log, scenario: Scenario) -> Any:
+    """Return the model that flew in the log."""
+    size = userdata_size(scenario.environment, scenario.plant)
+    with warnings.catch_warnings(action="ignore"):  # it was said when it flew
+        here = build(scenario.plant, scenario.rates, userdata=size).model
+    packed = log.attachment("model.mjb.gz")
+    return logged_model(here, packed, log.metadata, log.shape("/state", "physics"))
+
+
 def shares_of_thrust(log: Log, engine: Any, times: Array) -> Iterator[float]:
     """Yield the thrust at each time over the engine's largest: 0 for a vehicle without engine."""
     if engine is None:
@@ -145,7 +158,7 @@ def captions(log: Log, times: Array) -> Iterator[str]:
     def truth(field: str) -> Iterator[Array]:
         return nearest_rows(log, "/truth", field, times)
 
-    if "position_error" in log.topics["/truth"]:
+    if "position_error" in log.topics.get("/truth", ()):
         for row in zip(truth("position"), truth("velocity"), truth("position_error"), strict=True):
             yield overlay.path_text(*row)
     else:

@@ -17,6 +17,8 @@ from mjspace.errors import InputError, failure, input_error_at
 from mjspace.interrupts import Interrupted, on_signals
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.log.rows import due
+from mjspace.log.writer import nanoseconds
 from mjspace.runner.former_names import as_logged, logged_name
 from mjspace.runner.logged_code import code_of, require_trust, unpack
 from mjspace.runner.output import LOG, refuse_existing
@@ -24,11 +26,12 @@ from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.simulation.initial_state import Start
+from mjspace.simulation.initial_state import Start, first_start, start_at, state_of_log
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block, Rows, one_vehicle, shapes
 from mjspace.simulation.user_code import reference_at
 from mjspace.vehicle import vehicle
+from mjspace.vehicle.logged_model import logged_model
 
 
 @dataclass(frozen=True)
@@ -90,9 +93,8 @@ def replay(
     refuse_existing(path, force=force)
     with assembly_of(log, law, folder, trust=trust) as assembly:
         begin = start_of(log, assembly, start, fresh_law=law is not None)
-        member = int(log.metadata["member"])
         return fly_to_log(
-            assembly, path, member=member, start=begin, force=force, progress=progress
+            assembly, path, member=log.member, start=begin, force=force, progress=progress
         )
 
 
@@ -121,12 +123,19 @@ def verify(
         )
     with assembly_of(log, trust=trust) as assembly, on_signals() as stop:
         begin = start_of(log, assembly, start)
-        for block in stop.breaking_off(fly(assembly, begin, [int(log.metadata["member"])])):
+        if begin.period == 0:
+            expected = {"physics": first_start(assembly, [log.member]).physics}
+            begun = {"time": np.zeros(1), "physics": begin.physics}
+            found = first_difference({"/state": begun}, {"/state": expected})
+            if found is not None:
+                return dataclasses.replace(found, reason="the scenario begins otherwise")
+        for block in stop.breaking_off(fly(assembly, begin, [log.member])):
             if stop():
                 raise Interrupted(stop.signal)
             flown = as_logged(one_vehicle(block), log.topics)
             _check_topics(log, block)
             logged = log.read_topics(dict.fromkeys(flown), start=block.time[0], end=block.time[-1])
+            _check_rows(log, logged, block)
             found = first_difference(logged, _as_often(log, logged, flown, block.time))
             if found is not None:
                 return dataclasses.replace(found, reason=_other_streams(log, assembly.scenario))
@@ -178,14 +187,12 @@ def assembly_of(
         unpack(code, Path(own))
         law_folder = None if law is None else folder
         assembly = assemble(scenario, Path(own), trust=trust, law_folder=law_folder)
-        model = vehicle.from_bytes(log.attachment("model.mjb.gz"))
-        here = assembly.vehicle.model
-        if (model.nq, model.nv, model.nuserdata) != (here.nq, here.nv, here.nuserdata):
-            raise InputError(
-                "log: another version of mjspace laid its state out differently: fly it again with "
-                f"version {log.metadata.get('mjspace', 'that flew it')} and the revision "
-                f"{log.metadata.get('git') or 'that it names'}"
-            )
+        model = logged_model(
+            assembly.vehicle.model,
+            log.attachment("model.mjb.gz"),
+            log.metadata,
+            log.shape("/state", "physics"),
+        )
         yield dataclasses.replace(assembly, vehicle=vehicle.on_model(assembly.vehicle, model))
 
 
@@ -221,10 +228,20 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
             f"{log.every['/state'] * period:g} s, and the nearest is at {found:.10g} s"
         )
     state = {name: values for name, values in row.items() if name != "time"}
+    physics = state_of_log(assembly, state["physics"])
+    if abs(physics[0, 0] - number * period) > 0.5 * period:
+        raise InputError(f"log: /state.physics has t = {physics[0, 0]:g} s at {time:g} s")
     sensors, actuators = (
         {name.removeprefix(kind): v for name, v in state.items() if name.startswith(kind)}
         for kind in ("sensor_", "actuator_")
     )
+    fresh = start_at(assembly, physics, [log.member])
+    for kind, logged, expected in (
+        ("sensor_", sensors, fresh.sensors),
+        ("actuator_", actuators, fresh.actuators),
+    ):
+        for name, right in expected.items():
+            _check_shape(f"{kind}{name}", logged.get(name), right)
     law_state: Any = None
     if not fresh_law:
         absent = dict.fromkeys(REPORTED_BY_PLANT, np.empty((1, 0)))
@@ -244,8 +261,34 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
         missing = [field for field, name in zip(fields, names, strict=True) if name not in state]
         if missing:
             raise InputError(f"the log has no state {missing[0]!r} for this law: another flew")
+        for field, name in zip(fields, names, strict=True):
+            _check_shape(name, state[name], np.asarray(getattr(template, field)))
         law_state = type(template)(*(state[name] for name in names)) if names else ()
-    return Start(number, state["physics"], sensors, law_state, actuators)
+    return Start(number, physics, sensors, law_state, actuators)
+
+
+def _check_shape(name: str, logged: Array | None, right: Array) -> None:
+    found = None if logged is None else logged.shape[1:]
+    if found != right.shape[1:]:
+        raise InputError(f"log: /state.{name} has shape {found}, should be {right.shape[1:]}")
+
+
+def _check_rows(log: Log, logged: Rows, block: Block) -> None:
+    """Refuse a log that lacks rows of these control periods, or has others among them."""
+    stamps = nanoseconds(block.time)
+    first = round(log.start / log.control_period)
+    sequence = block.period - first + np.arange(len(stamps))
+    for topic, every in log.every.items():
+        found = nanoseconds(logged[topic]["time"])
+        expected = stamps[due(first, sequence, every)]
+        lacking = np.setdiff1d(expected[expected <= nanoseconds(np.array(log.end))], found)
+        if len(lacking):
+            at = f"t = {lacking[0] / 1e9:g} s"
+            raise InputError(f"log: {topic} lacks its row at {at}: it is damaged, or recovered")
+        other = np.setdiff1d(found, stamps)
+        if len(other):
+            at = f"t = {other[0] / 1e9:g} s"
+            raise InputError(f"log: {topic} has a row at {at}, at which there is no control period")
 
 
 def _check_topics(log: Log, block: Block) -> None:

@@ -117,7 +117,7 @@ def print_log(log: Log) -> None:
             listed.append(f"{name} {size}" + (f" [{units[name]}]" if name in units else ""))
         often = ""
         if log.every[topic] > 1:
-            often = f"every {log.every[topic] * float(log.metadata['control_period']):g} s: "
+            often = f"every {log.every[topic] * log.control_period:g} s: "
         table.add_row(topic, _shown(often + ", ".join(listed)))
     table.add_row("attachments", _shown(", ".join(sorted(log.attachments))))
     altered = log.altered()

@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.environment.magnetic_field import FIELD, MOMENT
+from mjspace.errors import InputError
 from mjspace.scenario.scenario import Scenario
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.effects import effects_of
@@ -54,6 +56,31 @@ def initial_physics(assembly: Assembly, vehicles: int) -> Array:
     row = np.empty(mujoco.mj_stateSize(model, INTEGRATION))
     mujoco.mj_getState(model, data, row, INTEGRATION)
     return np.repeat(row[None], vehicles, axis=0)
+
+
+def state_of_log(assembly: Assembly, physics: Array) -> Array:
+    """Return a logged integration state, (1, nstate), with the constants of the ``assembly`` in it.
+
+    ``userdata`` tells the native callbacks which memory to read and write. Of a log, which may be a
+    stranger's, only what changes in flight is taken: the magnetic field and the moment.
+
+    Raises:
+        InputError: a number of it is not finite.
+    """
+    bad = np.flatnonzero(~np.isfinite(physics[0]))
+    if len(bad):
+        raise InputError(f"log: /state.physics[{bad[0]}] is {physics[0, bad[0]]}, not finite")
+    model = assembly.vehicle.model
+    data = mujoco.MjData(model)
+    mujoco.mj_setState(model, data, physics[0], INTEGRATION)
+    constants = assembly.userdata.copy()
+    if assembly.field is not None:
+        for changes in (FIELD, MOMENT):
+            constants[changes] = data.userdata[changes]
+    data.userdata = constants
+    row = np.empty_like(physics)
+    mujoco.mj_getState(model, data, row[0], INTEGRATION)
+    return row
 
 
 def start_at(assembly: Assembly, physics: Array, members: Sequence[int]) -> Start:

@@ -176,9 +176,9 @@ def packed(mjb: bytes) -> bytes:
     return gzip.compress(mjb, compresslevel=3, mtime=0)
 
 
-def from_bytes(data: bytes) -> Any:
-    """Return the ``mujoco.MjModel`` that was ``packed``."""
-    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": gzip.decompress(data)})
+def from_mjb(mjb: bytes) -> Any:
+    """Return the ``mujoco.MjModel`` that ``to_mjb`` made bytes of: not for a stranger's."""
+    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": mjb})
 
 
 def _driven(model: Any, table: PlantTable) -> Iterator[Driven]:

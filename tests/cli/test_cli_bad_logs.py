@@ -62,8 +62,11 @@ def assert_refused(command: Command, path: str, message: str) -> None:
         (b"just text", "bad.mcap is not an MCAP file"),
         (b"\x89MCAP0\r\n", "bad.mcap is an MCAP file, but not a log of mjspace"),
         # a schema record of two bytes, a message index before any chunk, a channel of garbage
-        (b"\x89MCAP0\r\n\x03\x02" + bytes(9), "bad.mcap is damaged: a record in it cannot be"),
-        (b"\x89MCAP0\r\n\x07\x08" + bytes(15), "bad.mcap is damaged: a record in it cannot be"),
+        (
+            b"\x89MCAP0\r\n\x03\x02" + bytes(9),
+            "the schema record at byte 8 cannot be read",
+        ),
+        (b"\x89MCAP0\r\n\x07\x08" + bytes(15), "the message index record at byte 8 cannot be read"),
         (b"\x89MCAP0\r\n\x04\x09" + bytes(7) + b"\xff" * 9, "bad.mcap is damaged"),
     ],
 )

@@ -1,14 +1,12 @@
 """Commands with odd options: each does its work, or refuses in one line with status 2."""
 
-import contextlib
-import io
 import random
 import shutil
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from mjspace import cli
+from outcomes import faults, outcome
+
 from mjspace.errors import is_plain
 
 NUMBERS = [
@@ -66,11 +64,11 @@ SIZES = ["20000x20000", "16x16", "0x0", "-1x5", "axb", "64x48", "1e3x1e3", "64",
 FILES = ["x.png", "x.mp4", "x.avi", "", ".", "/x/y.png", "flight.mcap", "a" * 300 + ".png"]
 
 
-def cases(seed: int) -> Iterator[tuple[str, list[str]]]:
+def cases(seed: int | str) -> Iterator[tuple[str, list[str]]]:
     """Yield names of cases and the words of their command lines."""
     number = 0
     while True:
-        yield f"{seed}/{number}", words(random.Random(f"{seed}/{number}"))
+        yield f"{seed}-{number}", words(random.Random(f"{seed}-{number}"))
         number += 1
 
 
@@ -117,31 +115,13 @@ def words(draw: random.Random) -> list[str]:
     return given
 
 
-def attempt(given: list[str], log: Path) -> str:
-    """Run a command beside a copy of the ``log``; return what is wrong with how it ended."""
-    shutil.copy(log, "flight.mcap")
-    Path("x.toml").write_text('base = "contraction-ideal"\nchecks = []\nduration = 0.02\n')
-    out, err = io.TextIOWrapper(io.BytesIO(), "utf-8"), io.TextIOWrapper(io.BytesIO(), "utf-8")
-    sys.argv = ["mjspace", *given]
-    status: object = None
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            cli.main()
-        except SystemExit as ended:
-            status = ended.code or 0
-    said = [line for line in _text(err).splitlines() if not line.startswith("mjspace: warning")]
-    if status not in (0, 1, 2):
-        return f"{given}: status {status}: {said}"
-    usage = any(line.startswith("Usage:") for line in said)
-    if status == 2 and len(said) != 1 and not usage:
-        return f"{given}: {len(said)} lines: {said}"
-    if not all(map(is_plain, said)):
-        return f"{given}: control characters: {said}"
-    return ""
-
-
-def _text(stream: io.TextIOWrapper) -> str:
-    stream.flush()
-    buffer = stream.buffer
-    assert isinstance(buffer, io.BytesIO)
-    return buffer.getvalue().decode(errors="replace")
+def attack(given: list[str], log: Path, folder: Path) -> Iterator[str]:
+    """Yield the faults of a command beside a copy of the ``log``, in the empty ``folder``."""
+    shutil.copy(log, folder / "flight.mcap")
+    text = 'base = "contraction-ideal"\nchecks = []\nduration = 0.02\n'
+    (folder / "x.toml").write_text(text)
+    found = outcome(given, folder)
+    usage = found.status == 2 and found.error.startswith("Usage:")
+    yield from (f"{given}: {fault}" for fault in faults(found) if not usage)
+    if not is_plain(found.error.replace("\n", "")):
+        yield f"{given}: control characters: {found.error!r}"

@@ -109,7 +109,9 @@ def test_a_record_that_cannot_be_read_is_damage_and_named_as_that(whole: Path) -
     encoding = content.index(b"ros2msg")
     path = whole.with_name("torn.mcap")
     path.write_bytes(content[:encoding] + b"\xff" + content[encoding + 1 :])  # no UTF-8
-    with pytest.raises(ValueError, match=r"torn.mcap is damaged: a record in it cannot be read"):
+    with pytest.raises(
+        ValueError, match=r"torn.mcap is damaged: the schema record at byte \d+ cannot be read"
+    ):
         Log(path)
 
 
@@ -236,7 +238,7 @@ def test_a_damaged_chunk_is_named_and_the_others_are_read(whole: Path) -> None:
     path = whole.with_name("damaged.mcap")
     path.write_bytes(content)
     log = Log(path)
-    where = re.escape(f"{path}: the chunk at byte {second.chunk_start_offset + 9} is damaged")
+    where = re.escape(f"{path}: the chunk at byte {second.chunk_start_offset + 9} cannot be read")
     with pytest.raises(ValueError, match=where):
         log.read("/truth")
     assert len(log.read("/truth", end=0.006)["time"]) == BLOCKS[0]
@@ -267,7 +269,7 @@ def test_a_damaged_index_is_named(whole: Path) -> None:
         content[position + 9 + 6 + 8 + 7] ^= 0xFF  # of the first offset, its highest byte
     path = whole.with_name("damaged.mcap")
     path.write_bytes(content)
-    where = f"the index of the chunk at byte {first.chunk_start_offset + 9} is damaged"
+    where = f"the chunk at byte {first.chunk_start_offset + 9} cannot be read: its index is damaged"
     for read in (Log(path).altered, lambda: Log(path).read("/truth")):
         with pytest.raises(ValueError, match=where):
             read()

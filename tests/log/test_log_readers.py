@@ -373,7 +373,7 @@ def test_an_uncompressed_copy_is_read_and_another_compression_named(
     plain = rewritten(flown, tmp_path / "plain.mcap", compression=CompressionType.NONE)
     assert Log(plain).altered() == []
     packed = rewritten(flown, tmp_path / "packed.mcap", compression=CompressionType.LZ4)
-    with pytest.raises(ValueError, match=r"packed.mcap: compression 'lz4': write the log anew"):
+    with pytest.raises(ValueError, match=r"packed.mcap: .* compression 'lz4': write the log anew"):
         Log(packed).read("/truth")
 
 

@@ -1,5 +1,6 @@
 """Pictures and videos of a log: what must be seen on them, and what refuses to be drawn."""
 
+import gzip
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -24,7 +25,7 @@ from mjspace.rendering.offscreen import Canvas
 from mjspace.rendering.render import captions, nearest_rows, render, shares_of_thrust
 from mjspace.rendering.scene import Stage
 from mjspace.rendering.video import Video
-from mjspace.vehicle.vehicle import from_bytes
+from mjspace.vehicle.vehicle import from_mjb
 
 SIZE = 320, 180
 Pixels = NDArray[np.int64]
@@ -58,7 +59,7 @@ def still(pictured_log: Path, tmp_path_factory: pytest.TempPathFactory) -> Calla
 @pytest.fixture
 def stage(pictured_log: Path) -> Stage:
     log = Log(pictured_log)
-    model = from_bytes(log.attachment("model.mjb.gz"))
+    model = from_mjb(gzip.decompress(log.attachment("model.mjb.gz")))
     return Stage(model, "chase", scenario_of(log).environment.orbit)
 
 
@@ -315,7 +316,7 @@ def test_a_landers_caption_tells_of_its_path(descent: Log) -> None:
 
 
 def test_the_plume_on_stage_is_the_logged_thrust(descent: Log) -> None:
-    model = from_bytes(descent.attachment("model.mjb.gz"))
+    model = from_mjb(gzip.decompress(descent.attachment("model.mjb.gz")))
     full, geom = model.geom("engine_plume").size[2], model.geom("engine_plume").id
     stage = Stage(model, "chase", None)
     (share,) = shares_of_thrust(descent, scenario_of(descent).plant.engine, np.array([0.5]))

@@ -1,6 +1,7 @@
 """The log of a flight against what flew: every topic against its own source, and their units."""
 
 import errno
+import gzip
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +30,7 @@ from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block
 from mjspace.vehicle import vehicle
-from mjspace.vehicle.vehicle import from_bytes
+from mjspace.vehicle.vehicle import from_mjb
 
 OVERRIDES = [
     "duration=0.1",
@@ -67,7 +68,7 @@ def frames(log: Log) -> dict[int, Any]:
 
 
 def test_frames_are_those_of_the_state(log: Log) -> None:
-    model = from_bytes(log.attachment("model.mjb.gz"))
+    model = from_mjb(gzip.decompress(log.attachment("model.mjb.gz")))
     data = mujoco.MjData(model)
     found = frames(log)
     assert sorted(found) == [10_000_000 * k for k in range(11)]  # 100 times a second

@@ -356,7 +356,7 @@ def test_what_cannot_be_replayed_is_refused(noisy: Result, tmp_path: Path) -> No
             verify(noisy.path, start=time)
     nonsense = tmp_path / "x.mcap"
     nonsense.write_bytes(b"hello")
-    with pytest.raises(InputError, match=r"log: .*x\.mcap"):
+    with pytest.raises(InputError, match=r"x\.mcap is not an MCAP file"):
         verify(nonsense)
     with pytest.raises(InputError, match="the log that"):
         replay(noisy.path, noisy.path.parent)
