@@ -198,10 +198,12 @@ class Law(VariableStructure):
 """
 
 
+@pytest.mark.parametrize("periods", [2, 3, 40])  # of a block, so that it is in any of them
 @pytest.mark.parametrize("sensors", [[], ["sensors.position.period='60 ms'"]])
 def test_a_law_that_is_called_in_python_is_called_once_where_something_happens(
-    sensors: list[str], tmp_path: Any
+    sensors: list[str], periods: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(loop, "BLOCK_PERIODS", periods)
     flights = []
     for compiled in (True, False):
         folder = tmp_path / str(compiled)
