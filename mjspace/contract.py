@@ -264,7 +264,7 @@ class Law(Protocol):
     ``PulseCommand``. ``reference`` is a row of the scenario's reference: ``DesiredMotion``.
 
     Laws are flown compiled where that is possible: ``step`` is called once on arrays that note what
-    is computed with them, and for the first period of every block. One that has to be called in
+    is computed with them, and for the first of at most 2000 periods. One that has to be called in
     each period, since it prints or counts, says ``compiled = False``.
 
     A batched law may have an inner loop as well, for what must be quick: a method

@@ -1,4 +1,4 @@
-"""Compiled blocks of a flight, each proved by its first period, which Python flies as well."""
+"""Compiled blocks of a flight, proved by periods which Python flies as well."""
 
 import itertools
 import warnings
@@ -42,8 +42,11 @@ class CompiledBlocks:
         stepper: Stepper,
         law: FlownLaw,
         threads: int,
+        proof: int,
     ) -> None:
-        self._assembly, self._start = assembly, start
+        """A ``proof`` is good for so many periods."""
+        self._assembly, self._start, self._proof = assembly, start, proof
+        self._reached = self._proved = -1
         self._members, self._threads = members, threads
         self._stepper, self._law = stepper, law
         self._flight: CompiledFlight | None = None
@@ -129,10 +132,33 @@ class CompiledBlocks:
             self._off(f"{different} differs from Python's", after)
             return columns, None
         self._take(flight)
-        if flight.has_law:
-            kind: Any = type(flight.law)
-            self._law.state = kind(*(values.copy() for values in flight.law)) if flight.law else ()
+        self._reached, self._proved = first.number + len(compiled), first.number
         return compiled, trouble
+
+    def fly_on(self, first: int, count: int, last: int, desired: DesiredMotion) -> Columns | None:
+        """Return the columns of ``count`` periods that the last proof is good for as well.
+
+        Many vehicles have short blocks: each would cost them all a period in Python. None where
+        there is no such proof, and where MuJoCo raises or warns: Python flies on.
+        """
+        flight = self._flight
+        if flight is None or not flight.has_law or self._stepper.effects:
+            return None
+        if first != self._reached or first + count > self._proved + self._proof:
+            return None
+        before = self._after_a_period()
+        flight.begin(first, count, last, desired, ())
+        try:
+            flight.fly_periods(count)
+        except SimulationError as error:
+            self._off(str(error), before)
+            return None
+        if flight.warned:
+            self._off("MuJoCo warned", before)
+            return None
+        self._take(flight)
+        self._reached += count
+        return flight.columns()
 
     def _call_law(
         self,
@@ -218,6 +244,9 @@ class CompiledBlocks:
         self._stepper.memory = _copied(flight.memory)
         if flight.has_sensors:
             self._stepper.sensors = _copied(flight.sensors)
+        if flight.has_law:
+            kind: Any = type(flight.law)
+            self._law.state = kind(*(values.copy() for values in flight.law)) if flight.law else ()
 
     def _compile(self, example: ControlPeriod, desired: DesiredMotion) -> CompiledFlight:
         """Return the compiled flight, of the law too if that can be.

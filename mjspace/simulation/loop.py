@@ -100,7 +100,9 @@ class _Flight:
         self._law = FlownLaw(assembly.law, start.law, len(members))
         inner = self._law.inner if assembly.inner else None
         self.stepper = Stepper(assembly, start, members, threads=threads, inner=inner)
-        self.compiled = CompiledBlocks(assembly, start, members, self.stepper, self._law, threads)
+        self.compiled = CompiledBlocks(
+            assembly, start, members, self.stepper, self._law, threads, BLOCK_PERIODS
+        )
         # Each period, with law, signals and measurement.
         recorded = 4 * self.stepper.batch.state.nbytes
         self._periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
@@ -111,7 +113,8 @@ class _Flight:
     ) -> tuple[Columns, DesiredMotion, FlightError | None]:
         """Fly a block of periods; return what it recorded, what was desired, and what ended it.
 
-        Where the period can be compiled, its first is flown in Python, and proves the rest.
+        Where the period can be compiled, its first is flown in Python, and proves the rest; and the
+        blocks that follow, up to ``BLOCK_PERIODS`` periods of each vehicle.
 
         Raises:
             FlightError: nothing was recorded.
@@ -120,7 +123,10 @@ class _Flight:
         count = _in_a_block(min(self._periods, last - first + 1), self._seconds)
         times = np.arange(first, first + count, dtype=float) * self._control
         desired = reference_at(self._assembly.reference, times)
-        if not self.compiled.on:
+        proved = self.compiled.fly_on(first, count, last, desired)
+        if proved is not None:
+            columns, trouble = proved, None
+        elif not self.compiled.on:
             columns, _, trouble = self._fly_in_python(first, count, last, desired, stop)
         else:
             columns, period, trouble = self._fly_in_python(first, 1, last, desired, stop)

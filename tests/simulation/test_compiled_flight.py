@@ -3,6 +3,7 @@
 import dataclasses
 import re
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -528,6 +529,59 @@ def test_a_command_that_is_no_numbers_any_more_ends_the_flight_as_in_python(
     assert "actuators compiled" in compiled.compiled
     assert "the law's command: torque is not numbers" in python.trouble
     assert_same(compiled, python)
+
+
+def _blocks_of(periods: int, built: Assembly, members: Sequence[int]) -> int:
+    """Return the ``BLOCK_BYTES`` of which blocks of these vehicles have so many periods."""
+    return periods * 4 * first_start(built, members).physics.nbytes
+
+
+def test_a_proof_is_good_for_the_short_blocks_that_follow(monkeypatch: pytest.MonkeyPatch) -> None:
+    built, members = assembly("contraction-noise", "duration=0.1", *ERRORS), (0, 1, 2)
+    python, by_python, sense = flown(built, members, compiled=False), [], Stepper.sense
+
+    def noted(self: Any, number: int) -> Any:
+        by_python.append(number)
+        return sense(self, number)
+
+    monkeypatch.setattr(loop, "BLOCK_BYTES", _blocks_of(10, built, members))
+    monkeypatch.setattr(Stepper, "sense", noted)
+    found = flown(built, members)
+    assert by_python == [0, 40, 80]
+    assert_same(found, python)
+
+
+def test_trouble_in_a_block_without_a_proof_of_its_own_is_met_in_python(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built = own_law(tmp_path, "torque = torque + np.where(time > 0.0605, np.inf, 0.0)")
+    python = flown(built, compiled=False)
+    monkeypatch.setattr(loop, "BLOCK_BYTES", _blocks_of(10, built, (0,)))
+    found = flown(built)
+    assert found.compiled == "flown in Python: MuJoCo warned"
+    assert "/command.torque is not finite" in found.trouble
+    assert_same(found, python)
+
+
+def test_an_error_of_mujoco_in_a_block_without_a_proof_of_its_own_is_met_in_python(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built, calls = own_law(tmp_path, "", 0.1, "sensors.rate.noise_std=0.01"), 0
+    python, flies = flown(built, compiled=False), CompiledFlight.fly_periods
+
+    def failing(self: Any, count: int) -> None:
+        nonlocal calls
+        calls += 1
+        flies(self, count)
+        if calls == 3:
+            raise SimulationError(np.array([0]), "no room", 1)
+
+    monkeypatch.setattr(loop, "BLOCK_BYTES", _blocks_of(10, built, (0,)))
+    monkeypatch.setattr(CompiledFlight, "fly_periods", failing)
+    found = flown(built)
+    assert calls == 3
+    assert re.fullmatch("flown in Python: .*no room", found.compiled)
+    assert_same(found, python)
 
 
 def test_stop_ends_it_after_the_block() -> None:
