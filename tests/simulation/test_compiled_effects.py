@@ -28,13 +28,13 @@ def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 ALL = "compiled: sensors, law, actuators and step effects ({})"
 LANDS = ["duration=1.2", "initial.position=[0.0, 0.0, 2.3]", "initial.velocity=[0.0, 0.0, -1.0]"]
-CRASHES = ["duration=0.6", "initial.position=[0.0, 0.0, 2.6]", "initial.velocity=[0.2, 0.0, -6.0]"]
+CRASHES = ["duration=0.6", "initial.position=[0.0, 0.0, 2.6]", "initial.velocity=[0.2, 0.0, -9.0]"]
 PLACES = "[[0,0.4,0],[0,-0.4,0],[0,0.4,0],[0,-0.4,0],[0,0,0.5],[0,0,-0.5],[0,0,0.5],[0,0,-0.5]]"
 WAYS = "[[0,0,1],[0,0,-1],[0,0,-1],[0,0,1],[0,1,0],[0,-1,0],[0,-1,0],[0,1,0]]"
 COLD_GAS = "thrust=0.5,specific_impulse='70 s',gas=0.5,exponent=1.4,minimum_on=0.01"
 SCENARIOS = {
     "lander-touchdown": ("lander", LANDS, "the ground contact, the burning mass", 1),
-    "lander-crash": ("lander", CRASHES, "the ground contact, the burning mass", 2),
+    "lander-crash": ("lander", CRASHES, "the ground contact, the burning mass", 3),
     "rcs-three-axis": ("rcs-three-axis", ["duration=4"], "the burning mass", 0),
     "rcs-schmitt": ("rcs-schmitt", ["duration=0.2"], "the burning mass", 0),
     "rcs-three-axis, empty": (
@@ -198,10 +198,12 @@ class Law(VariableStructure):
 """
 
 
+@pytest.mark.parametrize("periods", [2, 3, 40])  # of a block, so that it is in any of them
 @pytest.mark.parametrize("sensors", [[], ["sensors.position.period='60 ms'"]])
 def test_a_law_that_is_called_in_python_is_called_once_where_something_happens(
-    sensors: list[str], tmp_path: Any
+    sensors: list[str], periods: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(loop, "BLOCK_PERIODS", periods)
     flights = []
     for compiled in (True, False):
         folder = tmp_path / str(compiled)
