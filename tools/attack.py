@@ -119,8 +119,9 @@ def _attacked(
 def _scenarios(seed: str, count: int) -> Findings:
     from scenarios import attack, cases
 
-    import mjspace.simulation.loop  # noqa: F401
+    from mjspace.simulation.block_kernel import block_function
 
+    block_function()  # shared by all forks
     found = Findings()
     for name, text in islice(cases(seed), count):
         found += _faults(partial(attack, name, text), name, KEEP / f"{name}.toml", text)
