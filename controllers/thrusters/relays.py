@@ -15,7 +15,7 @@ import numpy as np
 from mjspace import attitude as att
 from mjspace.contract import Array, Gains, Measurement, PulseCommand, Reference, Unit, gain
 
-from ..attitude.turn_kernels import turn
+from ..attitude.turn import turn
 from .allocation import effect, pattern
 
 

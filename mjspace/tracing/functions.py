@@ -178,6 +178,22 @@ def _cross(program: Program, a: Any, b: Any) -> Any:
     return move(program, lambda arrays: np.stack(arrays, axis=-1), whole)
 
 
+def _dot(program: Program, a: Any, b: Any) -> Any:
+    if np.ndim(a) == 0 or np.ndim(b) == 0:
+        return _call(program, np.multiply, a, b)
+    if np.ndim(a) > 2 or np.ndim(b) > 2:
+        raise Untraceable("np.dot of more than matrices: np.matmul can be")
+    product = _call(program, np.matmul, a, b)
+    if np.asarray(np.dot(a, b)).tobytes() != product.tobytes():
+        raise Untraceable("np.dot, which rounds unlike np.matmul here")
+    return product
+
+
+def _outer(program: Program, a: Any, b: Any) -> Any:
+    column, row = (move(program, np.ravel, each) for each in (a, b))
+    return _call(program, np.multiply, column[:, None], row[None, :])
+
+
 def _mean(program: Program, array: _Array, axis: Any = None, *, keepdims: bool = False) -> Any:
     array = ufuncs.as_float(program, array)
     total = _reduced(program, np.add, array, axis, keepdims=keepdims)
@@ -241,10 +257,12 @@ _ABOUT_SHAPES: frozenset[Any] = frozenset({np.ndim, np.shape, np.size})
 _OWN: dict[Any, Callable[..., Any]] = {
     np.clip: _clipped,
     np.cross: _cross,
+    np.dot: _dot,
     np.empty_like: lambda program, array, **options: _full_like(program, array, 0.0, **options),
     np.full_like: _full_like,
     np.linalg.norm: _norm,
     np.mean: _mean,
+    np.outer: _outer,
     np.ones_like: lambda program, array, **options: _full_like(program, array, 1.0, **options),
     np.sinc: _sinc,
     np.where: _where,

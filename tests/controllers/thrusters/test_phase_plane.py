@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mjspace.controllers.attitude.turn_kernels import turn
+from mjspace.controllers.attitude.turn import turn
 from mjspace.controllers.thrusters import phase_plane as laws
 from mjspace.controllers.thrusters.relays import State
 
