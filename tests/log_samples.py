@@ -80,7 +80,7 @@ def fly(path: Path) -> Path:
 def rewritten(
     path: Path,
     out: Path,
-    change: Callable[[str, int, bytes], bytes] = lambda topic, number, data: data,
+    change: Callable[[str, int, bytes], bytes | None] = lambda topic, number, data: data,
     *,
     digests: bool = True,
     attachments: Mapping[str, bytes] = {},
@@ -88,7 +88,8 @@ def rewritten(
 ) -> Path:
     """Write the log at ``path`` anew with mcap's own writer, as another tool would; return ``out``.
 
-    ``change`` gives each message's content, by its topic and its number on it; ``attachments``
+    ``change`` gives each message's content, by its topic and its number on it, or None to leave it
+    out; ``attachments``
     take the place of those of the same name, or are added.
     """
     numbers: Counter[str] = Counter()
@@ -116,10 +117,16 @@ def rewritten(
         for name in attachments.keys() - {kept.name for kept in reader.iter_attachments()}:
             writer.add_attachment(0, 0, name, "text/plain", attachments[name])
         for _, channel, message in reader.iter_messages(log_time_order=False):
-            data = change(channel.topic, numbers[channel.topic], message.data)
+            changed = change(channel.topic, numbers[channel.topic], message.data)
             numbers[channel.topic] += 1
+            if changed is None:
+                continue
             writer.add_message(
-                channels[channel.id], message.log_time, data, message.publish_time, message.sequence
+                channels[channel.id],
+                message.log_time,
+                changed,
+                message.publish_time,
+                message.sequence,
             )
         writer.finish()
     return out

@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from struct import Struct
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
@@ -102,7 +102,8 @@ def _add(
             raise ValueError("its length is not that of its entries")
         indexes[channel] = position
     elif opcode == Opcode.CHUNK:
-        found.chunks.append(ChunkPlace(position, length, *SPAN.unpack(file.read(SPAN.size)), {}))
+        start, end = SPAN.unpack(file.read(SPAN.size))
+        found.chunks.append(ChunkPlace(position, length, start, end, {}))
     elif opcode == Opcode.SCHEMA:
         schema = Schema.read(Exactly(io.BytesIO(content(file, position, length))))
         if found.schemas.setdefault(schema.id, schema) != schema:
@@ -175,7 +176,7 @@ def read_attachment(path: Path, name: str, position: int, length: int) -> bytes:
         raise InputError(f"{path}: the attachment {name!r} is damaged: {why}") from error
 
 
-def attachment(file: BinaryIO, position: int, length: int) -> Any:
+def attachment(file: BinaryIO, position: int, length: int) -> Attachment:
     """Return the ``Attachment`` whose content is at ``position``.
 
     Raises:
@@ -184,7 +185,7 @@ def attachment(file: BinaryIO, position: int, length: int) -> Any:
     attachment_name(file, position, length)
     data = content(file, position, length)
     stream = Exactly(io.BytesIO(data))
-    attached = Attachment.read(stream)
+    attached: Attachment = Attachment.read(stream)
     checksum = int.from_bytes(data[-4:], "little")
     if stream.count != length or checksum not in (0, zlib.crc32(data[:-4])):
         raise ValueError("its checksum is wrong")

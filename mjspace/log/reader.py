@@ -221,7 +221,9 @@ class Log:
         topics = self._topics_of(self.topics)
         for content in self._contents(topics, self._found.chunks):
             for channel in content.channels:
-                found.add_messages(topics[channel], content.tails(channel, digest.FROM))
+                with self._damage_of(topics[channel]):
+                    tails = content.tails(channel, digest.FROM)
+                found.add_messages(topics[channel], tails)
         now, written = found.by_topic(), self._found.digests
         return [topic for topic in written | now if now.get(topic) != written.get(topic)]
 

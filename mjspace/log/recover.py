@@ -14,11 +14,11 @@ from mjspace.log import digest
 from mjspace.log.checked import CONTROL_PERIOD, number, span, stamps
 from mjspace.log.chunk import INDEX, Part
 from mjspace.log.content import Content, message_offsets, unpacked
-from mjspace.log.encoding import HEADER, Fields, doubles
+from mjspace.log.encoding import HEADER, doubles
 from mjspace.log.file import NAME, LogFile
 from mjspace.log.index import ChunkPlace
 from mjspace.log.salvage import Salvage, salvage
-from mjspace.log.schema import PERIODIC, declared
+from mjspace.log.schema import PERIODIC, Shapes, declared
 
 
 class Recovered(NamedTuple):
@@ -70,7 +70,7 @@ def recover(path: Path, out: Path) -> Recovered:
         raise InputError(f"{out} exists: name a file that does not")
     with input_error_at("log"):
         found = salvage(path)
-    topics: dict[str, tuple[Fields, dict[str, str], int]] = {}
+    topics: dict[str, tuple[Shapes, dict[str, str], int]] = {}
     for topic in PERIODIC:
         if topic in found.channels:
             channel = found.channels[topic]

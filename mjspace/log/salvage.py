@@ -89,7 +89,7 @@ class _Search:
         else:
             if opcode == Opcode.CHUNK:
                 self.lost_since_chunk = False
-        return total
+        return int(total)
 
     def _add(self, opcode: int, position: int, length: int) -> None:
         found, file = self.found, self._file
@@ -130,7 +130,7 @@ class _Search:
         if position + RECORD.size > size:
             return self._is_end(position)
         opcode, length = RECORD.unpack(self._mapped[position : position + RECORD.size])
-        return 0 < opcode <= Opcode.DATA_END and position + RECORD.size + length <= size
+        return bool(0 < opcode <= Opcode.DATA_END and position + RECORD.size + length <= size)
 
     def _claimed(self, position: int) -> int:
         """Return to how many bytes, of those that are unpacked at all, a chunk claims to unpack."""

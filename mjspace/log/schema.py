@@ -34,6 +34,10 @@ PERIODIC = {
 _FOXGLOVE: dict[str, Any] = {"/tf": FrameTransforms, "/scene": SceneUpdate, "/events": Log}
 
 
+Shapes = dict[str, tuple[int, ...]]
+"""Of a topic's fields, by name."""
+
+
 class Scene(NamedTuple):
     """What a viewer draws: frames on /tf by body, and the geometry in those frames, twice."""
 
@@ -118,7 +122,7 @@ def _descriptor_of(file: FileDescriptor) -> bytes:
     return FileDescriptorSet(file=found.values()).SerializeToString()
 
 
-def declared(channel: Channel, schema: Schema | None) -> tuple[Fields, dict[str, str], int]:
+def declared(channel: Channel, schema: Schema | None) -> tuple[Shapes, dict[str, str], int]:
     """Return what a periodic channel of a log declares: shapes, units, ``every``.
 
     Raises:
@@ -160,10 +164,10 @@ def _field_names(schema: Schema, name: str) -> list[str]:
         ValueError: the schema is not a FileDescriptorSet of such a message.
     """
     try:
-        files = FileDescriptorSet.FromString(schema.data).file
+        found = FileDescriptorSet.FromString(schema.data)
     except DecodeError:
-        files = []
-    kinds = [kind for file in files for kind in file.message_type]
+        found = FileDescriptorSet()
+    kinds = [kind for file in found.file for kind in file.message_type]
     fields = sorted(kinds[0].field, key=lambda field: field.number) if len(kinds) == 1 else []
     good = len(kinds) == 1 and all(
         field.number == number and field.type == FieldDescriptorProto.TYPE_DOUBLE

@@ -89,7 +89,8 @@ def data_of(content: bytes) -> bytes:
 def chunk(messages: list[bytes], packed: bytes | None = None, size: int | None = None) -> bytes:
     """Return a chunk and its message indexes."""
     content = b"".join(record(MESSAGE, message) for message in messages)
-    times, places, at = [0], {}, 0
+    times, at = [0], 0
+    places: dict[int, list[bytes]] = {}
     for message in messages:
         if len(message) >= 14:
             time = int.from_bytes(message[6:14], "little")

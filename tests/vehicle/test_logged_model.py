@@ -95,5 +95,5 @@ def test_what_is_damaged_is_refused(here: Any) -> None:
     with pytest.raises(InputError, match="is not the one that flew, by the log's digest"):
         taken(here, mjb, model_sha256=hashlib.sha256(b"x").hexdigest())
     taken(here, mjb, model_sha256=hashlib.sha256(whole).hexdigest())
-    with pytest.raises(InputError, match="laid its state out differently: .* version 0.9"):
+    with pytest.raises(InputError, match=r"laid its state out differently: .* version 0\.9"):
         logged_model(here, whole, {"mjspace": "0.9"}, (3,))
