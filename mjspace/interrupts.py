@@ -37,24 +37,24 @@ class Stop:
     def __init__(self) -> None:
         self.signal = 0
         self.since = 0.0
-        self._breakable = False
+        self._breakable = self._at_once = False
 
     def __call__(self) -> bool:
         """Return whether a signal has been received."""
         return self.signal != 0
 
     @contextmanager
-    def breakable(self) -> Iterator[None]:
-        """Let the context be broken off after the grace time.
+    def breakable(self, *, at_once: bool = False) -> Iterator[None]:
+        """Let the context be broken off after the grace time, or by the request itself.
 
         Raises:
             Interrupted: so it was.
         """
-        self._breakable = True
+        self._breakable, self._at_once = True, at_once
         try:
             yield
         finally:
-            self._breakable = False
+            self._breakable = self._at_once = False
 
     def breaking_off(self, blocks: Iterator[_Block]) -> Iterator[_Block]:
         """Yield the ``blocks``; the making of each is breakable."""
@@ -65,6 +65,13 @@ class Stop:
             except StopIteration:
                 return
             yield block
+
+    def request(self, number: int) -> None:
+        """Request it for the signal of that number."""
+        self.signal = received[0] = number
+        self.since = time.monotonic()
+        if self._at_once:
+            self.break_off()
 
     def break_off(self, *_: Any) -> None:
         """Raise ``Interrupted`` in what is breakable: a handler of signals."""
@@ -98,10 +105,9 @@ def on_signals() -> Iterator[Stop]:
                 as_before()
                 signal.raise_signal(number)
             return
-        stop.signal = received[0] = number
-        stop.since = time.monotonic()
         signal.signal(signal.SIGALRM, stop.break_off)
         signal.setitimer(signal.ITIMER_REAL, GRACE, AGAIN)
+        stop.request(number)
 
     with _noticed_by_compiled_code():
         for number in caught:

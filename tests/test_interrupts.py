@@ -259,6 +259,18 @@ def test_a_second_signal_is_obeyed_as_before() -> None:
     assert reached == [signal.SIGINT]
 
 
+def test_what_has_not_begun_is_broken_off_at_once() -> None:
+    began = time.monotonic()
+    with (  # noqa: PT012
+        pytest.raises(KeyboardInterrupt),
+        interrupts.on_signals() as stop,
+        stop.breakable(at_once=True),
+    ):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(10.0)
+    assert time.monotonic() - began < interrupts.GRACE
+
+
 def test_a_log_ends_whole_at_a_hang_up(tmp_path: Path, law: Callable[..., Path]) -> None:
     result = run(law(f"import os; os.kill(os.getpid(), {int(signal.SIGHUP)})"), out=tmp_path / "o")
     assert result.signal == signal.SIGHUP

@@ -65,7 +65,7 @@ def each(
     with ours, ProcessPoolExecutor(cores, _CONTEXT, _begin, (theirs,)) as pool:
         due: dict[Future[Any], int] = {}
         try:
-            with stop.breakable():  # the first waits until everything is imported
+            with stop.breakable(at_once=True):  # the first waits until everything is imported
                 for index, (call, argument) in enumerate(calls):
                     due[pool.submit(_make, call, argument)] = index
             while due:
