@@ -54,9 +54,9 @@ def main() -> None:
         over = f"{ratio:.2f}" if ratio else ""
         row(str(count), f"{size:.1f}", f"{(size - ground) / count:.2f}", over)
     print(
-        f"\nA process that has not flown has {ground:.1f} MB, which `MB each` leaves out. `ratio` is "
-        "the time over bare steps of MuJoCo's batch, set-up included: of 5 s with wheels, 0.5 s of "
-        "members."
+        f"\nA process that has not flown has {ground:.1f} MB, which `MB each` leaves out. `ratio` "
+        "is the time over bare steps of MuJoCo's batch, set-up included: of 5 s with wheels, 0.5 s "
+        "of members."
     )
 
 
