@@ -1,11 +1,13 @@
 """Where a run writes its log: nothing is overwritten unasked, and no two runs write one."""
 
+import errno
 import os
 from pathlib import Path
 
 from mjspace.errors import InputError
 from mjspace.log import lock
 
+_WRONG_NAME = {errno.EEXIST, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ENOENT, errno.EINVAL}
 LOG = "flight.mcap"
 """The log's name in the folder of its run."""
 
@@ -24,6 +26,21 @@ def refuse_existing(path: Path, *, force: bool) -> None:
         raise _being_written(path)
     if not force:
         raise exists(path)
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder of a run, with those above it.
+
+    Raises:
+        InputError: there can be none of that name.
+        OSError: the disk does not take it.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        if error.errno not in _WRONG_NAME:
+            raise
+        raise InputError(f"--out {folder}: {error.strerror}") from error
 
 
 def remove(path: Path) -> None:

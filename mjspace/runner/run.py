@@ -11,7 +11,7 @@ from mjspace.interrupts import Interrupted, on_signals
 from mjspace.log.reader import Log
 from mjspace.runner.checks import Verdict, refuse_other_dimensions, refuse_unknown
 from mjspace.runner.flight_log import units_of
-from mjspace.runner.output import LOG, refuse_existing, remove
+from mjspace.runner.output import LOG, make_folder, refuse_existing, remove
 from mjspace.runner.recorder import Recorder
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
@@ -118,7 +118,7 @@ def fly_to_log(
         refuse_unknown(checks, topics)
         units = units_of(assembly, first.kinds)
         refuse_other_dimensions(checks, assembly.scenario.events, topics, units)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         if force:
             remove(path)
         recorder.begin(path, member, first)

@@ -127,6 +127,13 @@ def test_a_folder_in_its_place_is_refused(tmp_path: Path) -> None:
         fly(tmp_path, force=True)
 
 
+@pytest.mark.parametrize("name", ["file", "file/inside", "x" * 300])
+def test_a_folder_that_cannot_be_is_refused(name: str, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"--out .*: (File exists|Not a dir|File name too long)"):
+        run("detumble-wheels", overrides=SHORT, out=tmp_path / name)
+
+
 def test_a_log_is_locked_while_it_is_written(tmp_path: Path) -> None:
     path = tmp_path / "x"
     with lock.create(path):
