@@ -1,7 +1,9 @@
 # The set-up happens by itself, once, and again when what it reads changes.
 bin := .venv/bin
 
-.PHONY: run test flights mutation lint format docs validation constraints clean
+.PHONY: run test flights attack mutation lint format docs validation constraints clean
+
+seed = 1
 
 run: .venv/run.done
 	$(bin)/mjspace run contraction-adaptive --plot --video
@@ -12,6 +14,13 @@ test: .venv/dev.done
 # Every scenario from its beginning to its end, and the campaigns: about a quarter of an hour.
 flights: .venv/dev.done
 	$(bin)/python -m pytest -n 2 -m long
+
+# Damaged and hostile scenarios, options, logs and kills, from one seed: hours.
+attack: .venv/dev.done
+	$(bin)/python tools/attack.py scenarios --cases 10000 --seed $(seed)
+	$(bin)/python tools/attack.py options --cases 2000 --seed $(seed)
+	$(bin)/python tools/attack.py logs --cases 10000 --seed $(seed)
+	$(bin)/python tools/attack.py kills --cases 1000 --seed $(seed)
 
 # Which changes of the modules that carry trust no test notices: of each, 40 at random; an hour.
 mutation: .venv/dev.done

@@ -18,8 +18,8 @@ from flights import built, flight, logged, steps_of
 from timing import alternating, head, ratio, row, seconds
 
 from mjspace import attitude
-from mjspace.constants import GM
 from mjspace.contract import Array
+from mjspace.environment.constants import GM
 from mjspace.runner.run import fly_to_log
 from mjspace.simulation.assembly import Assembly
 

@@ -16,7 +16,7 @@ import numpy as np
 from timing import ROUNDS, alternating, head, row
 
 MJSPACE = (sys.executable, "-m", "mjspace")
-RUN = (*MJSPACE, "run", "contraction-ideal", "--duration", "2", "--out")
+RUN = (*MJSPACE, "run", "contraction-ideal", "--duration", "2", "--force", "--out")
 COMMANDS = {
     "python alone": ((sys.executable, "-c", ""), None),
     "import mjspace": ((sys.executable, "-c", "import mjspace"), 0.05),

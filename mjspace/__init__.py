@@ -5,8 +5,15 @@ The command line's words from Python: ``list_scenarios()``, ``load(scenario)``, 
 ``Log(path)`` reads a log as NumPy arrays. Where a log is an argument, its path or a ``Log`` may be.
 """
 
-from importlib import import_module
-from typing import Any
+import os
+import sys
+
+_HOME = os.path.dirname(os.path.dirname(__file__))
+if sys.argv[:1] == ["-m"] and not sys.flags.safe_path and sys.path[0] != _HOME:
+    del sys.path[0]  # python -m mjspace imports nothing from the current folder
+
+from importlib import import_module  # noqa: E402
+from typing import Any  # noqa: E402
 
 __version__ = "0.1.0"
 

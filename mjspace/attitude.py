@@ -6,9 +6,13 @@ Markley and Crassidis 2014, "Fundamentals of Spacecraft Attitude Determination a
 section 2.9, with Hamilton's product in place of theirs.
 """
 
+from typing import Any
+
 import numpy as np
 
+from mjspace.algebra import quaternion_product
 from mjspace.contract import Array
+from mjspace.gufunc import gufunc
 
 
 def normalize(vector: Array) -> Array:
@@ -19,17 +23,7 @@ def normalize(vector: Array) -> Array:
 
 def multiply(p: Array, q: Array) -> Array:
     """Return the product p q, shape (..., 4): the rotation q, then p."""
-    p0, p1, p2, p3 = _components(p)
-    q0, q1, q2, q3 = _components(q)
-    return np.stack(
-        [
-            p0 * q0 - p1 * q1 - p2 * q2 - p3 * q3,
-            p0 * q1 + p1 * q0 + p2 * q3 - p3 * q2,
-            p0 * q2 - p1 * q3 + p2 * q0 + p3 * q1,
-            p0 * q3 + p1 * q2 - p2 * q1 + p3 * q0,
-        ],
-        axis=-1,
-    )
+    return quaternion_product(p, q)
 
 
 def conjugate(q: Array) -> Array:
@@ -39,19 +33,18 @@ def conjugate(q: Array) -> Array:
 
 def rotate(q: Array, v: Array) -> Array:
     """Return the inertial components of ``v`` (..., 3), given in body axes: R(q) v."""
-    pure = np.concatenate([np.zeros_like(v[..., :1]), v], axis=-1)
-    return multiply(multiply(q, pure), conjugate(q))[..., 1:]
+    return multiply(multiply(q, pure(v)), conjugate(q))[..., 1:]
+
+
+def pure(v: Array) -> Array:
+    """Return the quaternion [0, v], shape (..., 4), of a vector (..., 3)."""
+    return np.concatenate([np.zeros_like(v[..., :1]), v], axis=-1)
 
 
 def to_matrix(q: Array) -> Array:
     """Return R(q), shape (..., 3, 3), whose columns are the body axes in the inertial frame."""
-    q0, q1, q2, q3 = _components(q)
-    rows = [
-        [q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, 2 * (q1 * q2 - q0 * q3), 2 * (q1 * q3 + q0 * q2)],
-        [2 * (q1 * q2 + q0 * q3), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, 2 * (q2 * q3 - q0 * q1)],
-        [2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    matrix: Array = _to_matrix.ufunc(q, _THREE)
+    return matrix
 
 
 def from_matrix(matrix: Array) -> Array:
@@ -151,10 +144,23 @@ def from_mrp(sigma: Array) -> Array:
     return np.concatenate([1.0 - square, 2.0 * sigma], axis=-1) / (1.0 + square)
 
 
-def _components(q: Array) -> tuple[Array, Array, Array, Array]:
-    return q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-
-
 def _positive_scalar(q: Array) -> Array:
     sign: Array = np.copysign(1.0, q[..., :1])
     return sign * q
+
+
+_THREE = np.zeros(3)  # an operand from which the matrix takes its shape
+
+
+@gufunc(["void(f8[:], f8[:], f8[:, :])"], "(q),(v)->(v,v)")
+def _to_matrix(q: Any, _: Any, matrix: Any) -> None:
+    q0, q1, q2, q3 = q
+    matrix[0, 0] = q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3
+    matrix[0, 1] = 2.0 * (q1 * q2 - q0 * q3)
+    matrix[0, 2] = 2.0 * (q1 * q3 + q0 * q2)
+    matrix[1, 0] = 2.0 * (q1 * q2 + q0 * q3)
+    matrix[1, 1] = q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3
+    matrix[1, 2] = 2.0 * (q2 * q3 - q0 * q1)
+    matrix[2, 0] = 2.0 * (q1 * q3 - q0 * q2)
+    matrix[2, 1] = 2.0 * (q2 * q3 + q0 * q1)
+    matrix[2, 2] = q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3

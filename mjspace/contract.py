@@ -106,7 +106,10 @@ class Measurement:
 
     def _replace(self, **changes: Array) -> Self:
         """Return a copy in which these arrays are others, or are measured as well."""
-        return type(self)(**self.__dict__ | changes)
+        copy = object.__new__(type(self))  # in a third of the time that __init__ takes
+        copy.__dict__.update(self.__dict__)
+        copy.__dict__.update(changes)
+        return copy
 
     def _map(self, function: Callable[[Array], Array]) -> Self:
         """Return a copy with ``function`` applied to each array, as ``lambda a: a[0]``."""
@@ -261,7 +264,7 @@ class Law(Protocol):
     ``PulseCommand``. ``reference`` is a row of the scenario's reference: ``DesiredMotion``.
 
     Laws are flown compiled where that is possible: ``step`` is called once on arrays that note what
-    is computed with them, and for the first period of every block. One that has to be called in
+    is computed with them, and for the first of at most 2000 periods. One that has to be called in
     each period, since it prints or counts, says ``compiled = False``.
 
     A batched law may have an inner loop as well, for what must be quick: a method

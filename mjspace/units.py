@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self, get_type_hints
 
+_MOST_PERIODS = 1e10
 _DEG = math.pi / 180.0
 _RPM = 2.0 * math.pi / 60.0
 
@@ -191,12 +192,23 @@ def _is_quantity(value: str) -> bool:
     return bool(unit) and _SYMBOLS.issuperset(symbols)
 
 
+def is_out_of_scale(number: float) -> bool:
+    """Return whether a finite number is of no quantity in any unit: its powers may overflow."""
+    return number != 0.0 and math.isfinite(number) and not 1e-100 <= abs(number) <= 1e100
+
+
 def whole_number(span: float, unit: float, span_key: str, unit_key: str) -> int:
     """Return how many ``unit`` [s] make up ``span`` [s].
 
     Raises:
-        ValueError: not a whole number of them, with both keys and the nearest right values.
+        ValueError: not a whole number of them, with both keys and the nearest right values; or more
+            than can be flown.
     """
+    if not span / unit <= _MOST_PERIODS:
+        raise ValueError(
+            f"{span_key}: {span:.10g} s is more than {_MOST_PERIODS:g} times {unit_key}, "
+            f"{unit:.10g} s"
+        )
     count = round(span / unit)
     if count < 1 or abs(span / unit - count) > 1e-6:
         below = math.floor(span / unit)
@@ -223,8 +235,11 @@ def _any_to_si(value: str) -> Quantity:
 
 
 def _split(value: str) -> tuple[float, str]:
-    number, _, written = value.strip().partition(" ")
+    text, _, written = value.strip().partition(" ")
     try:
-        return float(number), " ".join(written.split())
+        number = float(text)
     except ValueError:
         raise ValueError(f"got {value!r}, should be a number or a number with a unit") from None
+    if is_out_of_scale(number):
+        raise ValueError(f"got {value!r}: its size is not from 1e-100 to 1e100")
+    return number, " ".join(written.split())

@@ -12,11 +12,11 @@ import numpy as np
 from pydantic import BaseModel, RootModel
 
 from mjspace.scenario import sensors
-from mjspace.scenario.construct import controllers
 from mjspace.scenario.declared import tables_in, type_of
 from mjspace.scenario.files import scenario_names
 from mjspace.scenario.loading import load
 from mjspace.scenario.scenario import Component, Scenario
+from mjspace.scenario.trust import controllers
 
 SCALARS = (math.nan, math.inf, -math.inf, -1.0, 0.0, 400.0, True, "7", "x")
 

@@ -16,11 +16,12 @@ from annotated_types import MaxLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from mjspace.scenario.construct import controllers, table_of
+from mjspace.scenario.construct import table_of
 from mjspace.scenario.declared import DeclaredIn, tables_in, type_of
 from mjspace.scenario.fields import Si
 from mjspace.scenario.scenario import Scenario
 from mjspace.scenario.sensors import KINDS, kinds
+from mjspace.scenario.trust import controllers
 
 PAGE = Path(__file__).parents[1] / "docs/scenario.md"
 HEAD = """# The scenario reference

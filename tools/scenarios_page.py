@@ -7,9 +7,9 @@ import warnings
 from importlib import import_module
 from pathlib import Path
 
-from mjspace.scenario.construct import controllers
 from mjspace.scenario.files import scenario_names
 from mjspace.scenario.loading import load
+from mjspace.scenario.trust import controllers
 
 PAGE = Path(__file__).parents[1] / "docs/scenarios.md"
 HEAD = """# What flies

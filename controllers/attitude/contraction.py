@@ -7,15 +7,16 @@ sign that a sensor reports does not matter.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from mjspace.algebra import cross, dot, matrix_product, times, transpose
+from mjspace.attitude import conjugate, multiply, pure, to_matrix
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
-from . import contraction_kernels as kernels
+from .wheel_momentum import wheel_momentum
 
 
 class IdealState(NamedTuple):
@@ -88,6 +89,22 @@ class _Contraction(Gains):
     torque_limit: float = gain("N m", default=inf, above=0.0, at_most=inf)
     """Largest command on each axis."""
 
+    def _tracking(
+        self, before: Array, measurement: Measurement, reference: Reference
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return q on its path from ``before``, e = w - wd, wd, (3.8), and wd', (3.9)-(3.10)."""
+        q, w = _on_path(measurement.attitude, before), measurement.rate
+        lc, qd, wr = self.attitude_gain, reference.attitude, reference.rate
+        dqd = 0.5 * _rate(qd, wr)
+        ddqd = 0.5 * (_rate(qd, reference.acceleration) + _rate(dqd, wr))
+        u, du = dqd + lc * qd, ddqd + lc * dqd
+        wd = 2.0 * _along(q, u)
+        dwd = 2.0 * _along(q, du) - _along(u, _rate(q, w))
+        return q, w - wd, wd, dwd
+
+    def _limited(self, torque: Array) -> Array:
+        return np.clip(torque, -self.torque_limit, self.torque_limit)
+
 
 @dataclass(frozen=True)
 class Ideal(_Contraction):
@@ -114,15 +131,11 @@ class Ideal(_Contraction):
         self, state: IdealState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[IdealState, TorqueCommand, IdealSignals]:
         """Return the next state, the torque and the errors."""
-        measured, rate = measurement.attitude, measurement.rate
-        wheel_speed = measurement.wheel_speed
-        vehicle = (wheel_speed, self.inertia, self.wheel_axes, self.wheel_inertia, self._gains)
-        torque, e, wd, attitude = kernels.ideal(measured, rate, *reference, *state, *vehicle)
-        return IdealState(attitude), TorqueCommand(torque), IdealSignals(e, wd)
-
-    @cached_property
-    def _gains(self) -> Array:
-        return np.array([self.attitude_gain, self.rate_gain, self.torque_limit])
+        q, e, wd, dwd = self._tracking(state.attitude, measurement, reference)
+        H, w = self.inertia, measurement.rate
+        p = times(H, w) + wheel_momentum(self, measurement)
+        torque = times(H, dwd) - cross(p, wd) - self.rate_gain * e  # (3.6)
+        return IdealState(q), TorqueCommand(self._limited(torque)), IdealSignals(e, wd)
 
 
 @dataclass(frozen=True)
@@ -150,14 +163,13 @@ class Gradient(_Contraction):
         self, state: GradientState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[GradientState, TorqueCommand, GradientSignals]:
         """Return the next state, the torque, the errors and the estimates."""
-        measured, rate = measurement.attitude, measurement.rate
-        torque, e, wd, *after = kernels.gradient(measured, rate, *reference, *state, self._gains)
-        return GradientState(*after), TorqueCommand(torque), GradientSignals(e, wd, state.theta_hat)
-
-    @cached_property
-    def _gains(self) -> Array:
-        control = [self.attitude_gain, self.rate_gain, self.torque_limit]
-        return np.array([*control, self.adaptation_gain, self.control_period])
+        q, e, wd, dwd = self._tracking(state.attitude, measurement, reference)
+        Y = _regressor(dwd, _momentum_block(wd, q))
+        torque = times(Y, state.theta_hat) - self.rate_gain * e  # (4.2)
+        dtheta = -self.adaptation_gain * times(transpose(Y), e)  # (4.21), erratum 19
+        after = GradientState(q, state.theta_hat + self.control_period * dtheta)
+        signals = GradientSignals(e, wd, state.theta_hat)
+        return after, TorqueCommand(self._limited(torque)), signals
 
 
 @dataclass(frozen=True)
@@ -207,24 +219,60 @@ class Adaptive(_Contraction):
         self, state: AdaptiveState, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[AdaptiveState, TorqueCommand, AdaptiveSignals]:
         """Return the next state, the torque, the errors and the estimates."""
-        measured, rate = measurement.attitude, measurement.rate
-        torque, e, wd, eps, *after = kernels.adaptive(
-            measured, rate, *reference, *state, self._gains
-        )
-        return (
-            AdaptiveState(*after),
-            TorqueCommand(torque),
-            AdaptiveSignals(e, wd, state.theta_hat, eps),
-        )
+        attitude, theta_hat, g, Z, w_f, P_f, t_f = state
+        ga, da = self.adaptation_gain, self.adaptation_coupling
+        lF, lf = self.filter_bandwidth, self.forgetting
+        w, T = measurement.rate, self.control_period
+        q, e, wd, dwd = self._tracking(attitude, measurement, reference)
 
-    @cached_property
-    def _gains(self) -> Array:
-        control = [self.attitude_gain, self.rate_gain, self.torque_limit]
-        adaptation = [self.adaptation_gain, self.control_period, self.filter_bandwidth]
-        return np.array([*control, *adaptation, self.adaptation_coupling, self.forgetting])
+        Y = _regressor(dwd, _momentum_block(wd, q))
+        torque = self._limited(times(Y, theta_hat) - self.rate_gain * e)  # (4.2)
+
+        # The filter lF/(s + lF) of (2.41)-(2.44); the derivative of the filtered rate replaces w'.
+        dw_f, dP_f, dt_f = lF * (w - w_f), lF * (_momentum_block(w, q) - P_f), lF * (torque - t_f)
+        Yf = _regressor(dw_f, P_f)
+        eps = times(Yf, theta_hat) - t_f  # (4.8), (4.9)
+
+        dtheta = -ga * (da * g + times(transpose(Y), e))  # (4.5)
+        # (4.6) with erratum 15: -da ga Z g - ga Z Y^T e is Z theta_hat'.
+        dg = ga * times(transpose(Yf), eps) - lf * g + times(Z, dtheta)
+        dZ = ga * matrix_product(transpose(Yf), Yf) - lf * Z  # (4.7)
+
+        changes = (dtheta, dg, dZ, dw_f, dP_f, dt_f)
+        after = AdaptiveState(q, *(x + T * dx for x, dx in zip(state[1:], changes, strict=True)))
+        return after, TorqueCommand(torque), AdaptiveSignals(e, wd, theta_hat, eps)
 
 
 def _nearer(measurement: Measurement, reference: Reference) -> Array:
     """Return the measured q or -q, whichever is nearer to the reference, (..., 4)."""
-    along = np.sum(measurement.attitude * reference.attitude, axis=-1, keepdims=True)
-    return np.where(along < 0.0, -measurement.attitude, measurement.attitude)
+    return _on_path(measurement.attitude, reference.attitude)
+
+
+def _on_path(q: Array, before: Array) -> Array:
+    """Return q or -q, whichever is nearer to ``before``: a sensor may report either sign."""
+    return np.where(dot(q, before) < 0.0, -q, q)
+
+
+def _rate(q: Array, w: Array) -> Array:
+    """Return J(q) w = q [0, w], (..., 4): twice the rate of change of q."""
+    return multiply(q, pure(w))
+
+
+def _along(q: Array, u: Array) -> Array:
+    """Return J(q)^T u, (..., 3): the vector part of conj(q) u."""
+    return multiply(conjugate(q), u)[..., 1:]
+
+
+def _momentum_block(w: Array, q: Array) -> Array:
+    """Return S(w) R(q)^T, (..., 3, 3), of (2.40): w x each inertial axis, a column in body axes."""
+    return transpose(cross(w[..., None, :], to_matrix(q)))
+
+
+_W6 = np.array([[0, 1, 2, 3, 3, 3], [3, 0, 3, 1, 2, 3], [3, 3, 0, 3, 1, 2]])
+"""Where a1 a2 a3 0 stand in W6(a), with W6(a) [m11 m12 m13 m22 m23 m33] = M a."""
+
+
+def _regressor(a: Array, block: Array) -> Array:
+    """Return Y = [W6(a), block], (2.40), (..., 3, 9)."""
+    components = np.concatenate([a, np.zeros_like(a[..., :1])], axis=-1)
+    return np.concatenate([components[..., _W6], block], axis=-1)

@@ -14,13 +14,15 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_continuous_are
 
+from mjspace.algebra import cross, times
+from mjspace.attitude import conjugate, multiply
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
 from ..references.references import Regulation
-from . import wheel_feedback_kernels as kernels
+from .gain_table import GainTable
+from .wheel_momentum import wheel_momentum
 
 _TABLE_STEP = 0.1  # [s] between tabulated gains; 2e-9 of the largest, interpolated
 
@@ -142,13 +144,15 @@ class Regulator(Gains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the torque on the bus, -h', and the signals."""
-        measured, rate = measurement.attitude, measurement.rate
-        wheel_speed = measurement.wheel_speed
-        vehicle = (self.inertia, self.wheel_axes, self.wheel_inertia)
-        torque, *signals = kernels.linear(
-            measured, rate, *reference, wheel_speed, self.gain_at(time), *vehicle, self._full_rate
-        )
-        return state, TorqueCommand(torque), Signals(*signals)
+        M, w_ref = self.inertia, reference.rate
+        error = multiply(conjugate(reference.attitude), measurement.attitude)
+        a = 2.0 * error[..., 1:] / error[..., :1]
+        delta = measurement.rate - w_ref
+        u_ref = times(M, reference.acceleration) + cross(w_ref, times(M, w_ref))
+        u = u_ref + times(self.gain_at(time), np.concatenate([delta, a], axis=-1))
+        h = wheel_momentum(self, measurement)
+        torque = u - cross(h, self._turning(measurement.rate, delta))  # -h' = u - h x w
+        return state, TorqueCommand(torque), Signals(a, delta, u, h)
 
     def gain_at(self, time: float) -> Array:
         """Return K (3, 6) of u = u_ref + K [delta, a] at ``time`` [s]."""
@@ -160,7 +164,10 @@ class Regulator(Gains):
         state = np.concatenate([self.rate_weight, self.angle_weight])
         return Weights(np.diag(state), np.diag(self.torque_weight))
 
-    _full_rate: ClassVar[float] = 1.0
+    @staticmethod
+    def _turning(rate: Array, delta: Array) -> Array:
+        """Return the rate at which the wheels' momentum is turned."""
+        return rate
 
     @cached_property
     def _steady(self) -> Array:
@@ -187,23 +194,24 @@ class Tracker(Regulator):
 
     def gain_at(self, time: float) -> Array:
         """Return K (3, 6) at ``time`` [s]; after the turn it is the regulator's."""
-        K: Array = self._table(min(time, self.duration))
-        return K
+        return self._table.at(time)
 
     @cached_property
-    def _table(self) -> CubicSpline:
+    def _table(self) -> GainTable:
         motion = Regulation(self.angle, self.duration, self.axis)
         final = steady_cost(self.inertia, self.weights)
         time = np.linspace(0.0, self.duration, 1 + int(np.ceil(self.duration / _TABLE_STEP)))
         P = cost_to_go(self.inertia, self.weights, motion, final, time)
-        return CubicSpline(time, feedback(self.inertia, self.weights, P))
+        return GainTable(time, feedback(self.inertia, self.weights, P))
 
 
 @dataclass(frozen=True)
 class PrintedTracker(Tracker):
     """``Tracker`` with h' = -u + h x delta as printed (erratum 1): errors of 10 deg or more."""
 
-    _full_rate: ClassVar[float] = 0.0
+    @staticmethod
+    def _turning(rate: Array, delta: Array) -> Array:
+        return delta
 
 
 def _skew(v: Array) -> Array:

@@ -9,14 +9,15 @@ error changes, and with it the torque. All arrays may have leading vehicle axes.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from mjspace.algebra import cross, dot, times, transpose
+from mjspace.attitude import conjugate, multiply, to_matrix
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
-from . import pd_plus_kernels as kernels
+from .wheel_momentum import wheel_momentum
 
 
 class State(NamedTuple):
@@ -75,8 +76,68 @@ def commanded_torque(
     ``inertia`` is (3, 3) [kg m^2]. ``gains`` is [lam, Kc, tbar, eps] with the units of ``Robust``;
     eps is above zero, and a tbar of zero makes it (3.7), without the disturbance term.
     """
-    torque, sigma_e, s, *_ = kernels.modified(attitude, rate, momentum, *reference, inertia, gains)
-    return torque, sigma_e, s
+    lam, kc, tbar, eps = gains
+    sigma_e, s, feedforward, feedback = _modified(
+        attitude, rate, momentum, reference, inertia, lam, kc
+    )
+    return feedforward + feedback + _compensation(s, tbar, eps), sigma_e, s
+
+
+class _Errors(NamedTuple):
+    """Of the measured motion, and the desired one in body axes."""
+
+    sigma_e: Array
+    w_e: Array
+    wb: Array
+    """R_e^T wd [rad/s]."""
+    dwd_b: Array
+    """R_e^T wd' [rad/s^2]."""
+
+
+def _errors(attitude: Array, rate: Array, reference: Reference) -> _Errors:
+    error = _shorter(multiply(conjugate(reference.attitude), attitude))
+    sigma_e = error[..., 1:] / (1.0 + error[..., :1])  # (3.5), erratum E9
+    R_eT = transpose(to_matrix(error))
+    wb = times(R_eT, reference.rate)
+    return _Errors(sigma_e, rate - wb, wb, times(R_eT, reference.acceleration))
+
+
+def _shorter(error: Array) -> Array:
+    """Return the error quaternion or its negative, of the smaller angle, (..., 4).
+
+    At 180 deg its scalar is zero and both signs are valid: the sign is then chosen by the vector,
+    so that q and -q give the same result.
+    """
+    w, x, y, z = (error[..., k : k + 1] for k in range(4))
+    first = np.where(w != 0.0, w, np.where(x != 0.0, x, np.where(y != 0.0, y, z)))
+    return np.where(first < 0.0, -error, error)
+
+
+def _modified(
+    attitude: Array,
+    rate: Array,
+    momentum: Array,
+    reference: Reference,
+    inertia: Array,
+    lam: float,
+    kc: float,
+) -> tuple[Array, Array, Array, Array]:
+    """Return sigma_e, s, the feedforward and the feedback of (3.7), each (..., 3)."""
+    sigma_e, w_e, wb, dwd_b = _errors(attitude, rate, reference)
+    wr = wb - 2.0 * lam * sigma_e  # (3.8)
+    s = w_e + 2.0 * lam * sigma_e
+    square = dot(sigma_e, sigma_e)
+    # G(sigma_e) w_e, twice the rate of sigma_e.
+    G_w = 0.5 * (1.0 - square) * w_e + cross(sigma_e, w_e) + dot(sigma_e, w_e) * sigma_e
+    dwr = dwd_b + cross(wb, w_e) - lam * G_w  # (3.9)
+    feedforward = times(inertia, dwr) - cross(momentum, wr)  # (3.7)
+    feedback = -0.5 * (1.0 + square) * sigma_e - kc * s
+    return sigma_e, s, feedforward, feedback
+
+
+def _compensation(s: Array, tbar: float, eps: float) -> Array:
+    """Return (3.19), (..., 3)."""
+    return -tbar * tbar / (tbar * np.sqrt(dot(s, s)) + eps) * s
 
 
 @dataclass(frozen=True)
@@ -105,13 +166,12 @@ class Classical(Gains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, ClassicalSignals]:
         """Return the torque, the errors and the parts of the torque."""
-        attitude, rate = measurement.attitude, measurement.rate
-        torque, *signals = kernels.classical(attitude, rate, *reference, self.inertia, self._gains)
-        return state, TorqueCommand(torque), ClassicalSignals(*signals)
-
-    @cached_property
-    def _gains(self) -> Array:
-        return np.array([self.attitude_gain, self.rate_gain])
+        M = self.inertia
+        sigma_e, w_e, wb, dwd_b = _errors(measurement.attitude, measurement.rate, reference)
+        feedforward = times(M, dwd_b) + cross(wb, times(M, wb))
+        feedback = -self.attitude_gain * sigma_e - self.rate_gain * w_e
+        signals = ClassicalSignals(sigma_e, w_e, feedforward, feedback)
+        return state, TorqueCommand(feedforward + feedback), signals
 
 
 @dataclass(frozen=True)
@@ -129,6 +189,13 @@ class _ModifiedGains(Gains):
         """Return the empty state."""
         return State()
 
+    def _parts(
+        self, measurement: Measurement, momentum: Array, reference: Reference
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return sigma_e, s, the feedforward and the feedback of (3.7), each (..., 3)."""
+        gains = self.inertia, self.attitude_gain, self.rate_gain
+        return _modified(measurement.attitude, measurement.rate, momentum, reference, *gains)
+
 
 @dataclass(frozen=True)
 class Modified(_ModifiedGains):
@@ -143,16 +210,9 @@ class Modified(_ModifiedGains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, ModifiedSignals]:
         """Return the torque, the errors and the parts of the torque."""
-        attitude, rate = measurement.attitude, measurement.rate
-        momentum = kernels.rigid_momentum(self.inertia, rate)
-        torque, *signals, _ = kernels.modified(
-            attitude, rate, momentum, *reference, self.inertia, self._gains
-        )
-        return state, TorqueCommand(torque), ModifiedSignals(*signals)
-
-    @cached_property
-    def _gains(self) -> Array:
-        return np.array([self.attitude_gain, self.rate_gain, 0.0, 1.0])
+        momentum = times(self.inertia, measurement.rate)
+        signals = ModifiedSignals(*self._parts(measurement, momentum, reference))
+        return state, TorqueCommand(signals.feedforward + signals.feedback), signals
 
 
 @dataclass(frozen=True)
@@ -180,14 +240,10 @@ class Robust(_ModifiedGains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, RobustSignals]:
         """Return the torque, the errors and the parts of the torque."""
-        attitude, rate, M = measurement.attitude, measurement.rate, self.inertia
-        momentum = kernels.gyrostat_momentum(
-            M, rate, self.wheel_axes, self.wheel_inertia, measurement.wheel_speed
+        momentum = times(self.inertia, measurement.rate) + wheel_momentum(self, measurement)
+        parts = self._parts(measurement, momentum, reference)
+        signals = RobustSignals(
+            *parts, _compensation(parts[1], self.disturbance_bound, self.smoothing)
         )
-        torque, *signals = kernels.modified(attitude, rate, momentum, *reference, M, self._gains)
-        return state, TorqueCommand(torque), RobustSignals(*signals)
-
-    @cached_property
-    def _gains(self) -> Array:
-        control = [self.attitude_gain, self.rate_gain]
-        return np.array([*control, self.disturbance_bound, self.smoothing])
+        torque = signals.feedforward + signals.feedback + signals.compensation
+        return state, TorqueCommand(torque), signals

@@ -9,15 +9,16 @@ leading vehicle axes.
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from mjspace.algebra import cross, dot
+from mjspace.attitude import conjugate, multiply
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
-from . import wheel_feedback_kernels as kernels
+from .wheel_momentum import wheel_momentum
 
 
 class State(NamedTuple):
@@ -74,14 +75,19 @@ class _WheelLaw(Gains, ABC):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the next state, the torque on the bus, -h', and the signals."""
-        measured, rate = measurement.attitude, measurement.rate
-        wheel_speed = measurement.wheel_speed
-        wheels = (self.wheel_axes, self.wheel_inertia)
-        torque, error, k, u, *after = kernels.quaternion(
-            measured, rate, reference.attitude, wheel_speed, *state, *wheels, self._gains
-        )
+        q, w, T = measurement.attitude, measurement.rate, self.control_period
+        k0, hysteresis = self._law()
+        q = np.where(dot(q, state.attitude) < 0.0, -q, q)
+        error = multiply(conjugate(reference.attitude), q)
+        switches = state.sign * error[..., :1] < -hysteresis  # erratum 7
+        sign = np.where(switches, -state.sign, state.sign)
+        k = k0 * sign
+        u = -(k * error[..., 1:] + self.rate_gain * w)
+        torque = u - cross(wheel_momentum(self, measurement), w)  # -h' = u - h x w
+        path = state.path + T * np.sqrt(dot(w, w))
+        impulse = state.impulse + T * np.sqrt(dot(u, u))
         signals = Signals(error, k, u, state.path.copy(), state.impulse.copy())
-        return State(*after), TorqueCommand(torque), signals
+        return State(q, sign, path, impulse), TorqueCommand(torque), signals
 
     @abstractmethod
     def _law(self) -> tuple[float, float]:
@@ -90,11 +96,6 @@ class _WheelLaw(Gains, ABC):
     def _sign(self, scalar: Array) -> Array:
         """Return the initial sign of k (..., 1) for the error quaternion's ``scalar`` (..., 1)."""
         return np.ones_like(scalar)
-
-    @cached_property
-    def _gains(self) -> Array:
-        k, hysteresis = self._law()
-        return np.array([k, self.rate_gain, hysteresis, self.control_period])
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from mjspace.algebra import times
 from mjspace.contract import Array, Gains, GimbalRateCommand, Measurement, Reference, gain
 
-from ..attitude import pd_plus, pd_plus_kernels
+from ..attitude import pd_plus
 from . import cmg_steering
 
 
@@ -82,7 +83,7 @@ class CmgCluster(Gains):
         torque, sigma_e, s = pd_plus.commanded_torque(
             measurement.attitude,
             measurement.rate,
-            pd_plus_kernels.rigid_momentum(self.inertia, measurement.rate) + wheel_momentum,
+            times(self.inertia, measurement.rate) + wheel_momentum,
             reference,
             self.inertia,
             self._attitude_gains,

@@ -113,9 +113,12 @@ class VariableStructure(GimballedEngine):
         engine: Array = self._gains[-2]
         if not self.tank or not propellant.shape[-1]:
             return engine
-        engine = np.repeat(engine[None], propellant.size, axis=0)
-        engine[:, _MASS] -= self.tank - propellant.ravel()
-        return engine.reshape(*propellant.shape[:-1], -1)
+        left = engine[_MASS] - (self.tank - propellant)
+        others = (
+            np.broadcast_to(part, (*left.shape[:-1], len(part)))
+            for part in (engine[:_MASS], engine[_MASS + 1 :])
+        )
+        return np.concatenate([next(others), left, next(others)], axis=-1)
 
     @cached_property
     def _gains(self) -> tuple[Array, ...]:

@@ -6,7 +6,7 @@ loop's gain (erratum E21: the printed 9e6 1/s needs steps of 3e-7 s).
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, inf, pi, sin
+from math import inf, pi
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -93,9 +93,9 @@ class SpeedBench(Gains):
     ) -> tuple[BenchState, VoltageCommand, BenchSignals]:
         """Return the next state, the voltage and the estimates; the reference is not used."""
         speed, current = measurement.wheel_speed, measurement.current
-        desired = np.full_like(speed, self.amplitude * sin(self.frequency * time))
+        desired = np.full_like(speed, self.amplitude * np.sin(self.frequency * time))
         ahead = self.frequency * (time + 1.0 / self.current_gain)
-        slope = np.full_like(speed, self.amplitude * self.frequency * cos(ahead))
+        slope = np.full_like(speed, self.amplitude * self.frequency * np.cos(ahead))
         memory, commanded = self._speed_loop.step(
             state.speed_memory, current, speed, desired, slope, np.zeros_like(speed)
         )

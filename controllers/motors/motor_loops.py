@@ -23,7 +23,7 @@ Differences from the paper:
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 from typing import Any, NamedTuple
 
@@ -31,8 +31,7 @@ import numpy as np
 
 from mjspace.contract import Array
 
-from . import motor_kernels as kernels
-
+_TINY = 1e-12  # added to psi^2, far below any estimate: sin(psi x) / psi is regular
 _RK4 = 2.785  # largest |pole| times step on the real axis that RK4 damps
 Gain = Array | float
 
@@ -78,8 +77,8 @@ class CurrentLoop:
     def __post_init__(self) -> None:
         for name in ("resistance", "inductance", "torque_constant", "period", "proportional_gain"):
             _require_positive(name, getattr(self, name))
-        kep, kei = self._gains[3:5]
-        decay = np.broadcast_to(np.asarray(self.resistance) / self.inductance, kep.shape)
+        decay = np.asarray(self.resistance) / self.inductance
+        kep, kei, decay = np.broadcast_arrays(self.proportional_gain, self._kei, decay)
         refuse_fast_poles(kep, kei, decay, self.period)
 
     def reset(self, speed: Array) -> Array:
@@ -95,19 +94,22 @@ class CurrentLoop:
         [A], ``speed`` (..., m) the speed of the rotor relative to its stator [rad/s]. ``voltage``
         is the commanded (u_d, u_q) [V]; it is not limited to the supply's.
         """
-        result: tuple[Array, Array] = kernels.current_loop.ufunc(
-            integral, current, desired, speed, self._gains
-        )
-        return result
+        L, km, kep, kei = self.inductance, self.torque_constant, self.proportional_gain, self._kei
+        I_d, I_q = current[..., 0], current[..., 1]
+        error_d, error_q = I_d, I_q - desired
+        electrical = self.pole_pairs * speed
+        u_d = L * (-electrical * I_q - kep * error_d - kei * integral[..., 0])  # (4.36)
+        u_q = L * (electrical * I_d - kep * error_q - kei * integral[..., 1]) + km * speed  # (4.37)
+        # Anti-windup: beyond the supply's limit the integrals hold.
+        grown = np.where(np.hypot(u_d, u_q) > self.voltage_limit, 0.0, self.period)
+        error = np.stack([error_d, error_q], axis=-1)
+        return integral + grown[..., None] * error, np.stack([u_d, u_q], axis=-1)
 
-    @cached_property
-    def _gains(self) -> Array:
-        kep = np.asarray(self.proportional_gain, dtype=float)
-        kei = kep * self.resistance / self.inductance
+    @property
+    def _kei(self) -> Gain:
         if self.integral_gain is not None:
-            kei = np.asarray(self.integral_gain, dtype=float)
-        motor = (self.pole_pairs, self.inductance, self.torque_constant)
-        return _stacked(*motor, kep, kei, self.voltage_limit, self.period)
+            return self.integral_gain
+        return self.proportional_gain * self.resistance / self.inductance
 
 
 @dataclass(frozen=True)
@@ -185,18 +187,58 @@ class SpeedLoop:
         ``acceleration`` (..., m) [rad/s^2] its derivative once the current has followed, and
         ``load`` (..., m) [N m] a known load torque that the motor has to hold in addition.
         """
-        carried = np.zeros_like(speed) if carried is None else carried
-        result: tuple[Array, Array] = kernels.speed_loop.ufunc(
-            memory, current, speed, carried, desired, acceleration, load, self._gains
-        )
-        return result
+        J, km, kp, ki = self.inertia, self.torque_constant, self.speed_gain, self.integral_gain
+        W = speed if carried is None else speed + carried
+        error = desired - W
+        drive = km * current[..., 1] - load
+        integral = memory[..., 2]
+        W_hat, z1, z2, phi = self._observed(memory, W, speed, error, drive)
+
+        psi = np.sqrt(phi)
+        angle = psi * speed * self.lead
+        ahead = np.cos(angle) * z1 + np.sin(angle) * psi * z2
+        torque = J * acceleration + load + kp * error + ki * integral - ahead  # (4.19)
+        unlimited = torque / km
+        limited = np.clip(unlimited, -self.current_limit, self.current_limit)
+        integral = integral + np.where(limited == unlimited, self.period, 0.0) * error
+        return np.stack([W, drive, integral, W_hat, z1, z2, phi, speed, limited], axis=-1), limited
+
+    def _observed(
+        self, memory: Array, W: Array, speed: Array, error: Array, drive: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return the estimates W, z1, z2 and psi^2 at this instant, each (..., m).
+
+        From the last instant to this one with the means of both measurements: the internal model
+        rotates by exactly the angle of the rotor.
+        """
+        J, T = self.inertia, self.period
+        ko, ke, ka = self.observer_gain, self.vibration_gain, self.adaptation_gain
+        before = [memory[..., column] for column in range(9)]
+        W_before, drive_before, _, W_hat, z1_before, z2_before, phi, speed_before, _ = before
+        if not np.any(self._observes):
+            return W, z1_before, z2_before, phi
+        mean_W, mean_drive = 0.5 * (speed + speed_before), 0.5 * (drive + drive_before)
+        slip = W_hat - W_before
+        psi = np.sqrt(phi + _TINY)
+        turn = psi * mean_W * T
+        cos, sin = np.cos(turn), np.sin(turn)
+        z1 = cos * z1_before + psi * sin * z2_before - T * ke * (slip + error)  # (4.21)
+        z2 = cos * z2_before - sin / psi * z1_before  # (4.22)
+        mean_z1, mean_z2 = 0.5 * (z1 + z1_before), 0.5 * (z2 + z2_before)
+        W_hat = W_hat + T * (mean_drive + mean_z1 - ko * slip) / J  # (4.20), erratum E14
+        # (4.34) and (4.35), with erratum E15, summed by parts over the period.
+        residual = T * (mean_z1 + mean_drive) - J * (W - W_before)
+        phi = np.clip(phi - ka * mean_W * mean_z2 * residual, 0.0, self.ratio_limit)
+        length = np.hypot(z1, np.sqrt(phi) * z2)
+        beyond = length > self.vibration_limit  # both choices are computed: no division by zero
+        share = np.where(beyond, self.vibration_limit, 1.0) / np.where(beyond, length, 1.0)
+        found, initial = (W_hat, share * z1, share * z2, phi), (W, *before[4:7])
+        chosen: Any = map(partial(np.where, self._observes), found, initial)
+        return tuple(chosen)
 
     @cached_property
-    def _gains(self) -> Array:
-        control = (self.inertia, self.torque_constant, self.speed_gain, self.integral_gain)
-        observer = (self.observer_gain, self.vibration_gain, self.adaptation_gain, self.lead)
-        limits = (self.ratio_limit, self.vibration_limit, self.current_limit)
-        return _stacked(*control, *observer, *limits, self.period)
+    def _observes(self) -> Any:
+        return np.asarray(self.vibration_gain) > 0.0
 
 
 def estimates(memory: Array) -> Estimates:
@@ -237,12 +279,6 @@ def refuse_fast_poles(kep: Gain, kei: Gain, decay: Gain, period: float) -> None:
             f"the steps of RK4 at most {_RK4 / fastest:.1e} s); or use a "
             f"gain of {0.3 / period:g} 1/s"
         )
-
-
-def _stacked(*values: Any) -> Array:
-    """Return an array (n, m): a row for each of n values, a column for each of m motors."""
-    columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in values))
-    return np.stack(columns)
 
 
 def _require_positive(name: str, value: Gain) -> None:

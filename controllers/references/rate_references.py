@@ -13,6 +13,7 @@ from mjspace.contract import Array, Gains, Reference, gain
 
 _TURN = 0.05  # [rad] of amplitude and phase in a step; 3e-14 rad after 60 s, 7.5e-14 with 0.1
 _BLOCK = 64  # steps
+_MOST_STEPS = 1_000_000  # half a minute of integration, 30 MB
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,18 @@ class Sinusoids(Gains):
     """
 
     def at(self, time: Array) -> Reference:
-        """Return the motion at each ``time`` [s]; before zero too."""
-        steps = np.floor(np.abs(time) / self._step).astype(int)
+        """Return the motion at each ``time`` [s]; before zero too.
+
+        Raises:
+            ValueError: a time too many steps of the grid away.
+        """
+        steps = np.floor(np.abs(time) / self._step)
+        if not steps.max(initial=0.0) <= _MOST_STEPS:
+            raise ValueError(
+                f"amplitude and frequency: at {np.abs(time).max():g} s the attitude is more than "
+                f"{_MOST_STEPS} steps of {self._step:.3g} s away, {_TURN:g} rad each"
+            )
+        steps = steps.astype(int)
         way = np.copysign(1.0, time)
         start = np.empty((len(time), 4))
         for index in {*zip(way.tolist(), (steps // _BLOCK).tolist(), strict=True)}:

@@ -120,13 +120,15 @@ class PhasePlane(Gains, ABC):
         self, state: State, time: float, command: Aim, measurement: Measurement
     ) -> tuple[State, PulseCommand]:
         """Return each thruster's on-time in the integration step that begins."""
-        desired = Reference(command.attitude, command.rate, command.acceleration)
-        if command.rate.any() or command.acceleration.any():
-            since = time - self.control_period * np.floor(time / self.control_period + 1e-9)
-            gained = since * command.acceleration
-            turned = att.from_rotation_vector(since * (command.rate + 0.5 * gained))
-            attitude = att.multiply(command.attitude, turned)
-            desired = desired._replace(attitude=attitude, rate=command.rate + gained)
+        since = time - self.control_period * np.floor(time / self.control_period + 1e-9)
+        gained = since * command.acceleration
+        turned = att.from_rotation_vector(since * (command.rate + 0.5 * gained))
+        turns = np.any(
+            (command.rate != 0.0) | (command.acceleration != 0.0), axis=-1, keepdims=True
+        )
+        attitude = np.where(turns, att.multiply(command.attitude, turned), command.attitude)
+        rate = np.where(turns, command.rate + gained, command.rate)
+        desired = Reference(attitude, rate, command.acceleration)
         memory, firing, duration = self._decide(
             state.memory, *turn(measurement, desired, self.axes)
         )

@@ -142,7 +142,7 @@ def _of(kind: Actuator, method: Callable[..., Result], *arguments: Any) -> Resul
     """
     try:
         return method(*arguments)
-    except Exception as error:
+    except BaseException as error:
         name = f"the actuator {type(kind).__name__} ({kind.logged_as})"
         raise failure(name, error) from error
 

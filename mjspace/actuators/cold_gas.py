@@ -24,8 +24,8 @@ from pydantic import Field
 from mjspace.actuators import tank as tanks
 from mjspace.actuators.base import Actuator, Context, Fields, Input, State, motors
 from mjspace.actuators.thruster_layout import ThrusterTable, names
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import Positive, Seconds, Si
 
@@ -117,9 +117,8 @@ class ColdGasThrusters(Actuator):
         A thruster is saturated when its on-time is no part of the control period or shorter than
         the least pulse.
         """
-        on_time = np.asarray(command.on_time, dtype=float)
         gas, count, mean, saturated = _blow_down.ufunc(
-            on_time, state["cold_gas"], state["cold_gas_step"], self.data, step
+            command.on_time, state["cold_gas"], state["cold_gas_step"], self.data, step
         )
         return {"cold_gas": gas, "cold_gas_step": count}, mean, saturated
 

@@ -17,8 +17,8 @@ from mjspace.actuators.base import (
     State,
     motors,
 )
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import TICK, Array, Measurement
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.gufunc import gufunc
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import NonNegative, Positive, Seconds, Si, Table, Time

@@ -19,6 +19,8 @@ class FaultKind(ABC):
     """Whether it has a ``value``."""
     is_positive: ClassVar[bool] = False
     """Whether that must be above zero."""
+    random: ClassVar[bool] = False
+    """Whether it draws random numbers."""
     remembers_begin: ClassVar[bool] = False
     """Whether what it remembers stays, while it is in force, what it was when it began."""
 
@@ -106,6 +108,7 @@ class Noisy(FaultKind):
 
     applies = "noise of standard deviation ``value`` more"
     is_positive = True
+    random = True
 
     def faulty(self, right: Array, value: float, oldest: Array, noise: Noise) -> Array:
         """Return the sum."""

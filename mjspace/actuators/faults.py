@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -71,7 +70,12 @@ class _Place:
     """Where a fault's motors are in what the kinds of actuators apply."""
 
     kind: int
-    columns: list[int]
+    columns: slice
+
+    @property
+    def width(self) -> int:
+        """How many motors they are."""
+        return self.columns.stop - self.columns.start  # type: ignore[no-any-return]
 
 
 def between(tables: Sequence[Fault], control: float) -> bool:
@@ -114,7 +118,7 @@ class FaultSet:
             place, key = known[fault.motor], f"faults.{number}.value"
             self._places.append(place)
             self._lengths.append(KINDS[fault.kind].memory(fault.value or 0.0, hold, key))
-            width = len(place.columns)
+            width = place.width
             self._noises.append(normals(seed, members, (STREAM + number,), width))
 
     def reset(self) -> State:
@@ -127,7 +131,7 @@ class FaultSet:
         state = {"fault_phase": np.full((self._vehicles, len(self._tables)), _WAITING)}
         for number, length in enumerate(self._lengths):
             if length:
-                width = len(self._places[number].columns)
+                width = self._places[number].width
                 state[f"fault_{number}_past"] = np.zeros((self._vehicles, width, length))
         return state
 
@@ -157,6 +161,33 @@ class FaultSet:
             ]
         return state | {"fault_phase": phase}, happened
 
+    @property
+    def noisy(self) -> bool:
+        """Whether a motor has noise."""
+        return any(KINDS[fault.kind].random for fault in self._tables)
+
+    def due(self, after: float) -> float:
+        """Return the first time from ``after`` on at which one begins or ends [s]."""
+        times = (time for fault in self._tables for time in (fault.at, fault.until))
+        return min((t for t in times if t is not None and t >= after - TICK), default=np.inf)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether one begins by a signal."""
+        return any(fault.when is not None for fault in self._tables)
+
+    def alarm(self, state: State, measured: Mapping[str, Any]) -> Array:
+        """Return where one begins by a signal, True or False, (N, faults that do).
+
+        Array code; ``measured`` is that of ``decide``.
+        """
+        phase, begins = state["fault_phase"], []
+        for number, fault in enumerate(self._tables):
+            if fault.when is not None:
+                waits = phase[:, number] == _WAITING
+                begins.append((waits & self._is_due(number, 0.0, measured))[:, None])
+        return np.concatenate(begins, axis=-1)
+
     def change(
         self, state: State, applied: tuple[Array, ...], now: float
     ) -> tuple[State, tuple[Array, ...]]:
@@ -166,7 +197,7 @@ class FaultSet:
             kind, right = KINDS[self._tables[number].kind], result[place.kind][:, place.columns]
             field = f"fault_{number}_past"
             past = state.get(field)
-            wrong = self._faulty(number, right, past, round(now / self._hold))
+            wrong = self._faulty(number, right, past, now)
             in_force = state["fault_phase"][:, number] == _IN_FORCE
             if past is not None:
                 newest = np.concatenate([past[..., 1:], right[..., None]], axis=-1)
@@ -181,11 +212,11 @@ class FaultSet:
             )
         return state, tuple(result)
 
-    def _faulty(self, number: int, right: Array, past: Array | None, index: int) -> Array:
+    def _faulty(self, number: int, right: Array, past: Array | None, now: float) -> Array:
         """Return what the fault's motors apply where it is in force, (N, motors)."""
         fault = self._tables[number]
         oldest = np.zeros(0) if past is None else past[..., 0]
-        noise = partial(self._noises[number], index)
+        noise = lambda: self._noises[number](round(now / self._hold))  # noqa: E731
         return KINDS[fault.kind].faulty(right, fault.value or 0.0, oldest, noise)
 
     def _is_due(self, number: int, now: float, measured: Mapping[str, Any] | None) -> Any:
@@ -195,14 +226,15 @@ class FaultSet:
         if fault.when is None or measured is None:
             return np.bool_(False)
         arrays = {
-            f"/{topic}": {n: np.asarray(a) for n, a in values._asdict().items() if np.size(a)}
+            f"/{topic}": {n: _as_array(a) for n, a in values._asdict().items() if np.size(a)}
             for topic, values in measured.items()
             if values
         }
         topics = {t: {n: a.shape[1:] for n, a in fields.items()} for t, fields in arrays.items()}
         with input_error_at(f"faults.{number}.when.signal"):
             topic, field, part = find_signal(topics, fault.when.signal)
-        rows = arrays[topic][field].reshape(self._vehicles, -1)
+        values = arrays[topic][field]
+        rows = values.reshape(len(values), -1)
         return fault.when.admits(magnitude(rows[:, part]))
 
 
@@ -212,8 +244,13 @@ def _places(kinds: Sequence[Actuator]) -> dict[str, _Place]:
     for number, kind in enumerate(kinds):
         columns = range(kind.drives.width)
         for column, name in zip(columns, kind.drives.motors, strict=False):
-            known[name] = _Place(number, [column])
+            known[name] = _Place(number, slice(column, column + 1))
         for column in columns:
-            known[f"{kind.logged_as}[{column}]"] = _Place(number, [column])
-        known[kind.logged_as] = _Place(number, list(columns))
+            known[f"{kind.logged_as}[{column}]"] = _Place(number, slice(column, column + 1))
+        known[kind.logged_as] = _Place(number, slice(0, len(columns)))
     return known
+
+
+def _as_array(values: Any) -> Any:
+    """Return the values as an array; one that is traced is none of NumPy's, and stays."""
+    return values if hasattr(values, "reshape") else np.asarray(values)

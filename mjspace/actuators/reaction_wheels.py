@@ -131,7 +131,10 @@ class Wheels(ActuatorTable, Bearing):
         if self.positions is not None:
             mount.pos = self.positions[index]
         else:
-            reach = _exit(spec.geom("bus_hull").size, axis) + _GAP
+            hull = spec.geom("bus_hull")
+            if hull is None:
+                raise ValueError("positions: missing, and the model has no hull to put wheels on")
+            reach = _exit(hull.size, axis) + _GAP
             for geom in part.geoms:
                 geom.pos[2] += reach
         spec.attach(part, prefix=f"{name}_", frame=mount)

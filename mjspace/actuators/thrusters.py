@@ -17,8 +17,8 @@ from mjspace.actuators.base import (
     motors,
 )
 from mjspace.actuators.thruster_layout import ThrusterTable, names
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.gufunc import gufunc
 from mjspace.scenario.fields import Positive, Seconds, Si, Time
 
@@ -140,9 +140,8 @@ class Thrusters(Actuator):
         A thruster is saturated when its on-time is no part of the control period or shorter than
         the least pulse, or when its tank is empty.
         """
-        on_time = np.asarray(command.on_time, dtype=float)
         before = (state[name] for name in FIELDS)
-        *after, mean, saturated = _pulse.ufunc(*before, on_time, self.data, step)
+        *after, mean, saturated = _pulse.ufunc(*before, command.on_time, self.data, step)
         return dict(zip(FIELDS, after, strict=True)), mean, saturated
 
     def measured(self, state: State, truth: Measurement) -> Measurement:

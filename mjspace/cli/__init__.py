@@ -6,6 +6,7 @@ input. Modules are imported when a command needs them:
 ``--help`` answers at once.
 """
 
+import sys
 import warnings
 
 import typer
@@ -35,6 +36,8 @@ app.command()(validation.validate)
 def main() -> None:
     """Run the command line; the entry point."""
     warnings.showwarning = print_warning
+    for stream in (sys.stdout, sys.stderr):  # whatever the terminal's encoding
+        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     with report_errors():
         graphics.check()
         app()

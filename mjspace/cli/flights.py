@@ -1,13 +1,24 @@
 """The commands ``mjspace run`` and ``mjspace replay``."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from mjspace.errors import InputError
-from mjspace.terminal.options import Json, LogFile, Out, Plot, Set, Traceback, Video
+from mjspace.terminal.options import (
+    Force,
+    Json,
+    LogFile,
+    Out,
+    Plot,
+    Set,
+    Traceback,
+    Trust,
+    Video,
+)
 from mjspace.terminal.reporting import cause_shown, open_log, print_cause, progress_bar
 
 if TYPE_CHECKING:
@@ -24,13 +35,16 @@ def run(
     overrides: Set = [],  # noqa: B006
     seed: Annotated[int | None, typer.Option(help="Seed of every random stream.")] = None,
     out: Out = None,
+    force: Force = False,
     duration: Annotated[str, typer.Option(help="Simulated time: 20, or '2 min'.")] = "",
     plot_it: Plot = False,
     video: Video = False,
     as_json: Json = False,
+    trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
     """Fly a scenario, log it and judge it."""
+    from mjspace.runner.output import LOG
     from mjspace.runner.run import fly_to_log, output_folder
     from mjspace.scenario.loading import load
     from mjspace.simulation.assembly import assemble
@@ -42,27 +56,32 @@ def run(
     if every:
         if plot_it or video:
             raise InputError("--all: has no pictures; plot and render the logs that matter")
-        _run_all([*overrides, *extra], output_folder(out, "all"), as_json)
+        _run_all([*overrides, *extra], output_folder(out, "all"), force, as_json)
     with cause_shown(traceback):
         loaded, folder = load(scenario, [*overrides, *extra])
-        assembly = assemble(loaded, folder)
+        assembly = assemble(loaded, folder, trust=trust)
         with progress_bar(loaded.duration, "flying") as progress:
-            path = output_folder(out, loaded.name) / "flight.mcap"
-            result = fly_to_log(assembly, path, progress=progress)
+            path = output_folder(out, loaded.name) / LOG
+            result = fly_to_log(assembly, path, force=force, progress=progress)
     _finish(result, plot_it, video, as_json, traceback)
 
 
-def _run_all(overrides: list[str], out: Path, as_json: bool) -> NoReturn:
+def _run_all(overrides: list[str], out: Path, force: bool, as_json: bool) -> NoReturn:
     from mjspace.runner import run_all
     from mjspace.scenario.files import scenario_names
 
+    names = scenario_names()
     with progress_bar(1.0, "flying", count="") as progress:
-        outcomes = run_all.fly(scenario_names(), overrides, out, progress)
+        outcomes, signal = run_all.fly(names, overrides, out, progress, force=force)
     if as_json:
         print(json.dumps(run_all.data(outcomes), indent=2))
     else:
         run_all.show(outcomes)
         print(f"logs   {out}")
+    if signal:
+        whole = sum(not outcome.result["trouble"] for outcome in outcomes)
+        print(f"mjspace: interrupted: {whole} of {len(names)} flown to the end", file=sys.stderr)
+        raise typer.Exit(128 + signal)
     raise typer.Exit(0 if all(outcome.result["passed"] for outcome in outcomes) else 1)
 
 
@@ -81,9 +100,11 @@ def replay(
         list[str], typer.Option("--gain", metavar="KEY=VALUE", help="A gain of --law; repeatable.")
     ] = [],  # noqa: B006
     out: Out = None,
+    force: Force = False,
     plot_it: Plot = False,
     video: Video = False,
     as_json: Json = False,
+    trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
     """Fly a log again: to prove it, or under another law."""
@@ -97,7 +118,7 @@ def replay(
     logged = open_log(log)
     with cause_shown(traceback), progress_bar(logged.end, "flying") as progress:
         if verify:
-            difference = again.verify(log, start=start, progress=progress)
+            difference = again.verify(log, start=start, trust=trust, progress=progress)
         else:
             result = again.replay(
                 log,
@@ -105,6 +126,8 @@ def replay(
                 start=start,
                 law=law or None,
                 gains=gains,
+                trust=trust,
+                force=force,
                 progress=progress,
             )
     if not verify:

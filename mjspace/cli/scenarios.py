@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from mjspace.errors import InputError
-from mjspace.terminal.options import Json, Set
+from mjspace.terminal.options import Json, Set, Trust
 from mjspace.terminal.reporting import open_log
 
 
@@ -34,6 +34,7 @@ def info(
             help="Of a scenario: begin its flight and say what of it is compiled, or why not.",
         ),
     ] = False,
+    trust: Trust = False,
     as_json: Json = False,
 ) -> None:
     """Show a scenario in full, or what a log holds."""
@@ -55,7 +56,7 @@ def info(
         from mjspace.simulation.assembly import assemble
         from mjspace.simulation.loop import what_is_compiled
 
-        found = what_is_compiled(assemble(scenario, folder))
+        found = what_is_compiled(assemble(scenario, folder, trust=trust))
         print(json.dumps(found) if as_json else found)
         return
     print(scenario.model_dump_json(indent=2) if as_json else to_toml(scenario).rstrip())

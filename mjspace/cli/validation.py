@@ -54,7 +54,7 @@ def validate(
     results = compared(results, basilisk)
     data, page = report.write(results, output_folder(out, "validate"))
     if as_json:
-        print(data.read_text().rstrip())
+        print(data.read_text(encoding="utf-8").rstrip())
     else:
         table.show(results)
         print(f"data   {data}\nreport {page}")

@@ -34,13 +34,14 @@ TOLERATED_ERROR = np.radians(1.0)
 """Attitude error [rad] that earns the full reward where no check of the scenario bounds it."""
 
 
-def load(scenario: str | Path, overrides: Iterable[str] = ()) -> Any:
+def load(scenario: str | Path, overrides: Iterable[str] = (), *, trust: bool = False) -> Any:
     """Return the ``dm_control.rl.control.Environment`` of a scenario, by name or path.
 
     ``overrides`` are ``"key=value"``, as ``--set`` takes them. Every episode is the same flight,
     that of member 0, on the stepper of a flight: the commands that a flight logged, as actions,
     leave bit for bit the ``/state`` of that flight. An action takes the place of the law and of its
     inner loop, and is held for one control period. Another ``seed`` gives other noise.
+    With ``trust`` the scenario may name files outside its folder and any installed module.
 
     Raises:
         InputError: bad input, in one line.
@@ -52,7 +53,7 @@ def load(scenario: str | Path, overrides: Iterable[str] = ()) -> Any:
                 f"faults.{number}.when.signal: {fault.when.signal}: an environment flies no law: "
                 "give a signal of truth, measurement or command"
             )
-    assembly = assemble(loaded, folder, inner=False)
+    assembly = assemble(loaded, folder, trust=trust, inner=False)
     return bridge.Environment(Physics(assembly), Tracking(assembly), n_sub_steps=loaded.rates.steps)
 
 

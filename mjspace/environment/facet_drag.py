@@ -6,12 +6,12 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from mjspace.constants import RADIUS
 from mjspace.contract import Array
 from mjspace.environment import joints, kepler
 from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies, add_force_on_bus, in_bus_axes
 from mjspace.environment.compiled import compiled
+from mjspace.environment.constants import RADIUS
 from mjspace.environment.dipole import EARTH_ROTATION
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import Finite, Meters3, Positive, Si, Switch, Table, Unit3

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from mjspace.contract import Array
 from mjspace.environment import dipole, kepler
-from mjspace.environment.magnetic_field import MagneticField
+from mjspace.environment.magnetic_field import MagneticField, of_piece
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.plant import Rates
 
@@ -67,11 +67,7 @@ class FieldAlongOrbit:
 
     def at(self, time: Array | float) -> Array:
         """Return the field [T], inertial axes, at ``time`` [s] of shape (...), as (..., 3)."""
-        piece = self.piece(time)
-        since = np.asarray(time)[..., None] - piece[..., :1]
-        cubic, square, slope, value = (piece[..., i : i + 3] for i in (1, 4, 7, 10))
-        field: Array = ((cubic * since + square) * since + slope) * since + value
-        return field
+        return of_piece(self.piece(time), np.asarray(time))
 
 
 def along(environment: Environment, rates: Rates, duration: float) -> FieldAlongOrbit | None:

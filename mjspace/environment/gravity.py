@@ -5,11 +5,11 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from mjspace.constants import GM, RADIUS
 from mjspace.contract import Array
 from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies, add_wrench
 from mjspace.environment.compiled import compiled
+from mjspace.environment.constants import GM, RADIUS
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import Positive, Si
 

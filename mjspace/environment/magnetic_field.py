@@ -21,6 +21,14 @@ MOMENT = slice(HEADER + 15, HEADER + 18)
 """In ``userdata``: the bus's magnetic moment [A m^2], body axes, to be written in flight."""
 
 
+def of_piece(piece: Array, time: Array) -> Array:
+    """Return the field [T] at ``time`` [s] (...) of a cubic (..., 13) as ``FIELD``, (..., 3)."""
+    since = time[..., None] - piece[..., :1]
+    cubic, square, slope, value = (piece[..., i : i + 3] for i in (1, 4, 7, 10))
+    field: Array = ((cubic * since + square) * since + slope) * since + value
+    return field
+
+
 @compiled
 def magnetic(payload: Any, time: float, bodies: Bodies) -> None:
     """Add moment x field [N m] on the bus, the moment being constant in body axes.

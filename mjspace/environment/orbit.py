@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
-from mjspace.constants import GM, RADIUS
 from mjspace.contract import Array
 from mjspace.environment import kepler
 from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies, add_wrench
 from mjspace.environment.compiled import compiled
+from mjspace.environment.constants import GM, RADIUS
 from mjspace.environment.gravity import gradient_torque
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import Finite, Positive, Si, WithinTurn

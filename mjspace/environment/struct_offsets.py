@@ -27,6 +27,11 @@ _SCALARS: dict[str, Any] = {
     "uint64_t": ctypes.c_uint64,
 }
 
+_NOT_LAID_OUT = (
+    f"mujoco {mujoco.__version__} is not laid out as its introspect module says; "
+    "reinstall mujoco or use another version"
+)
+
 # Every array is non-empty, so that no pointer is null, and every scalar has a value of its own.
 _PROBE = """
 <mujoco>
@@ -60,7 +65,9 @@ class ModelOffsets(NamedTuple):
     body_weldid: int
     body_dofnum: int
     body_dofadr: int
+    body_parentid: int
     body_mass: int
+    body_subtreemass: int
     body_inertia: int
     dof_parentid: int
 
@@ -73,6 +80,7 @@ class DataOffsets(NamedTuple):
     qvel: int
     ctrl: int
     qfrc_applied: int
+    xfrc_applied: int
     userdata: int
     xipos: int
     ximat: int
@@ -100,6 +108,21 @@ def find() -> tuple[ModelOffsets, DataOffsets]:
     return model_at, data_at
 
 
+@functools.cache
+def most_constraints() -> int:
+    """Return the verified offset [bytes] of mjData's ``maxuse_efc``, an int.
+
+    Raises:
+        RuntimeError: the layout is not that of the library as loaded.
+    """
+    data = mujoco.MjData(mujoco.MjModel.from_xml_string(_PROBE))
+    data.maxuse_efc = number = 0x5F3A71
+    place = int(layout("mjData").maxuse_efc.offset)
+    if ctypes.c_int.from_address(data._address + place).value != number:
+        raise RuntimeError(f"mjData.maxuse_efc is not at byte {place}: {_NOT_LAID_OUT}")
+    return place
+
+
 def verify(struct: Any, offsets: ModelOffsets | DataOffsets, size: int) -> None:
     """Compare what lies at ``offsets`` [words] in ``struct`` with what the Python binding reports.
 
@@ -120,8 +143,7 @@ def verify(struct: Any, offsets: ModelOffsets | DataOffsets, size: int) -> None:
         if found != expected:
             raise RuntimeError(
                 f"{kind}.{name}: found {found!r} at byte {word * WORD}, expected {expected!r}: "
-                f"mujoco {mujoco.__version__} is not laid out as its introspect module says; "
-                "reinstall mujoco or use another version"
+                f"{_NOT_LAID_OUT}"
             )
 
 

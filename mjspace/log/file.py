@@ -21,6 +21,7 @@ from mcap.records import (
 )
 
 from mjspace.log.chunk import Part, encode, record_bytes, sealed
+from mjspace.log.lock import create
 
 MAGIC = b"\x89MCAP0\r\n"
 """What an MCAP file begins and ends with."""
@@ -45,6 +46,7 @@ class LogFile:
         """Create ``path`` with everything that a reader needs before the first chunk.
 
         Raises:
+            FileExistsError: there is something already.
             OSError: it cannot be written.
         """
         self._registry = {
@@ -77,11 +79,12 @@ class LogFile:
         self._chunk_indexes = bytearray()
         self._error: OSError | None = None
         self._position = 0
-        self._file = path.open("wb", buffering=0)
+        self._file = create(path)
         try:
             self._put(head)
         except OSError:
             self._file.close()
+            path.unlink(missing_ok=True)  # without its head it is nothing
             raise
 
     def add_chunk(self, parts: Sequence[Part]) -> None:
@@ -128,6 +131,7 @@ class LogFile:
             while rest:
                 rest = rest[self._file.write(rest) :]
         except OSError as error:
+            error.filename = self._file.name
             self._error = error
             raise
         self._position += len(data)

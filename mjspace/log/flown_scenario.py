@@ -1,9 +1,8 @@
 """The scenario that a log says was flown."""
 
-import tomllib
-
 from mjspace.errors import input_error_at
 from mjspace.log.reader import Log
+from mjspace.scenario import raw
 from mjspace.scenario.loading import validate
 from mjspace.scenario.scenario import Scenario
 
@@ -16,6 +15,6 @@ def scenario_of(log: Log) -> Scenario:
     """
     text = log.attachment("scenario.toml")
     with input_error_at(f"{log.path}: the attachment 'scenario.toml'"):
-        table = tomllib.loads(text.decode())
+        table = raw.parsed(text.decode())
     table.pop("verdict", None)  # of logs from before checks said how they are expected to come out
     return validate(table, f"the scenario in {log.path}", context={"flown": True})

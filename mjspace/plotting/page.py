@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from mjspace.errors import whole_or_none
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.plotting.check_bounds import Bound, bounds
@@ -37,7 +38,9 @@ def plot(log: Log | Path | str, output: Path | str, *, signals: Sequence[str] = 
     if output.suffix != ".png":
         raise ValueError(f"output {str(output)!r}: end it in .png")
     with matplotlib.rc_context(STYLE):
-        figure(log, signals).savefig(output, dpi=110, facecolor="white")
+        page = figure(log, signals)
+        with whole_or_none(output):
+            page.savefig(output, dpi=110, facecolor="white")
 
 
 def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:

@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mjspace.contract import Array
+from mjspace.errors import whole_or_none
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.plotting.panels import unit
@@ -35,7 +36,9 @@ def plot(log: Log | Path | str, output: Path | str, x: str, y: str) -> None:
     if output.suffix != ".png":
         raise ValueError(f"output {str(output)!r}: end it in .png")
     with matplotlib.rc_context(STYLE):
-        figure(Log.of(log), x, y).savefig(output, dpi=130, facecolor="white")
+        plane = figure(Log.of(log), x, y)
+        with whole_or_none(output):
+            plane.savefig(output, dpi=130, facecolor="white")
 
 
 def figure(log: Log, x: str, y: str) -> Figure:

@@ -11,6 +11,7 @@ from PIL import Image
 
 from mjspace.contract import Array
 from mjspace.environment.install import userdata_size
+from mjspace.errors import whole_or_none
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering import overlay
@@ -20,6 +21,9 @@ from mjspace.rendering.video import Frame, Video
 from mjspace.scenario.scenario import Scenario
 from mjspace.vehicle.logged_model import logged_model
 from mjspace.vehicle.vehicle import build
+
+_LARGEST = 8192  # pixels: 2 GB of buffers, and every renderer has them
+_MOST_FRAMES = 1_000_000
 
 
 def render(
@@ -49,17 +53,23 @@ def render(
     log, output = Log.of(log), Path(output)
     if output.suffix not in (".mp4", ".png"):
         raise ValueError(f"output {str(output)!r}: end it in .mp4 for a video, .png for a still")
-    if min(size) < 16 or min(rate, speed) <= 0.0:
+    if not (min(size) >= 16 and max(size) <= _LARGEST and 0.0 < min(rate, speed) < np.inf):
         raise ValueError(
-            f"size {size[0]}x{size[1]}, rate {rate:g}, speed {speed:g}: "
-            "a size should be at least 16x16, a rate and a speed positive"
+            f"size {size[0]}x{size[1]}, rate {rate:g}, speed {speed:g}: a size should be from "
+            f"16x16 to {_LARGEST}x{_LARGEST}, a rate and a speed positive"
         )
     if output.suffix == ".png":
         times: Array = np.array([_still_time(log, at)])
         for frame in _frames(log, times, camera, size):
-            Image.fromarray(frame).save(output)
+            with whole_or_none(output):
+                Image.fromarray(frame).save(output)
         return
     period = speed / rate
+    if not (log.end - log.start) / period < _MOST_FRAMES:
+        raise ValueError(
+            f"rate {rate:g}, speed {speed:g}: a video of {(log.end - log.start) / period:.3g} "
+            f"frames, should be at most {_MOST_FRAMES}"
+        )
     count = int((log.end - log.start) / period + 1e-9) + 1
     times = np.linspace(log.start, log.start + period * (count - 1), count)
     with Video(output, size, rate) as video:

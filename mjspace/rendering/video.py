@@ -60,10 +60,17 @@ class Video:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        whole = False
         try:
-            if error is None:
+            self._close(finish=error is None)
+            whole = error is None
+        finally:
+            if not whole:
+                self._path.unlink(missing_ok=True)
+
+    def _close(self, *, finish: bool) -> None:
+        try:
+            if finish:
                 self._file.mux(self._stream.encode(None))
         finally:
             self._file.close()
-            if error is not None:
-                self._path.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ from typing import Self
 from mjspace.log.background import Background
 from mjspace.runner.checks import Judge, Verdict
 from mjspace.runner.flight_log import FlightLog, described
+from mjspace.runner.output import exists
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.recording import Block, one_vehicle, shapes
 
@@ -83,7 +84,11 @@ class Recorder:
                 raise
 
     def _create(self, path: Path, member: int, first: Block) -> None:
-        self._log = self._opened.enter_context(FlightLog(self._assembly, path, member, first))
+        try:
+            log = FlightLog(self._assembly, path, member, first)
+        except FileExistsError as error:
+            raise exists(path) from error
+        self._log = self._opened.enter_context(log)
 
     def _write(self, block: Block) -> None:
         self._log.write(block)

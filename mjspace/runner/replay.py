@@ -14,11 +14,14 @@ import numpy as np
 
 from mjspace.contract import REPORTED_BY_PLANT, TICK, Array
 from mjspace.errors import InputError, failure, input_error_at
+from mjspace.interrupts import Interrupted, on_signals
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.log.rows import due
 from mjspace.log.writer import nanoseconds
 from mjspace.runner.former_names import as_logged, logged_name
+from mjspace.runner.logged_code import code_of, require_trust, unpack
+from mjspace.runner.output import LOG, refuse_existing
 from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
@@ -29,8 +32,6 @@ from mjspace.simulation.recording import Block, Rows, one_vehicle, shapes
 from mjspace.simulation.user_code import reference_at
 from mjspace.vehicle import vehicle
 from mjspace.vehicle.logged_model import logged_model
-
-SOURCES = ("law", "reference", "disturbance")
 
 
 @dataclass(frozen=True)
@@ -63,39 +64,51 @@ def replay(
     law: Component | str | None = None,
     gains: Iterable[str] = (),
     folder: Path = Path(),
+    trust: bool = False,
+    force: bool = False,
     progress: Progress = lambda time: None,
 ) -> Result:
     """Fly a log again from time ``start`` [s] into a new log, ``flight.mcap`` in ``out``.
 
     ``law`` is another law, ``"module:Class"`` or ``"file.py:Class"``, with ``gains`` as
     ``"key=value"``; its files are looked up from ``folder``. Its state begins at ``start``, and the
-    checks and events of the logged law's signals are left out.
+    checks and events of the logged law's signals are left out. Code out of the log runs with
+    ``trust`` alone.
 
     Raises:
-        InputError: no such log, time, law or gain; ``out`` holds the log itself.
+        InputError: no such log, time, law or gain; ``out`` holds the log itself, or another that
+            ``force`` does not allow to replace.
         FlightError: the flight could not even begin.
         OSError: the new log cannot be written.
     """
     with input_error_at("log"):
         log = Log.of(log)
-    path = Path(out) / "flight.mcap"
+    path = Path(out) / LOG
     if path.exists() and path.samefile(log.path):
         raise InputError(f"--out {out}: holds the log that is to be flown again")
     if isinstance(law, str):
         law = component(law, gains)
     elif gains:
         raise InputError("gains: are for another law: name it by law")
-    with assembly_of(log, law, folder) as assembly:
+    refuse_existing(path, force=force)
+    with assembly_of(log, law, folder, trust=trust) as assembly:
         begin = start_of(log, assembly, start, fresh_law=law is not None)
-        return fly_to_log(assembly, path, member=log.member, start=begin, progress=progress)
+        return fly_to_log(
+            assembly, path, member=log.member, start=begin, force=force, progress=progress
+        )
 
 
 def verify(
-    log: Log | str | Path, *, start: float = 0.0, progress: Progress = lambda time: None
+    log: Log | str | Path,
+    *,
+    start: float = 0.0,
+    trust: bool = False,
+    progress: Progress = lambda time: None,
 ) -> Difference | None:
     """Fly a log again from time ``start`` [s]; return the first difference, None if there is none.
 
-    Every field of every topic is compared bit for bit, those of ``/state`` first.
+    Every field of every topic is compared bit for bit, those of ``/state`` first. Code out of the
+    log runs with ``trust`` alone.
 
     Raises:
         InputError: no such log or time, or rows that differ from the log's own digests.
@@ -108,15 +121,17 @@ def verify(
         raise InputError(
             f"log: {', '.join(altered)} changed since the flight, by the log's digests"
         )
-    with assembly_of(log) as assembly:
+    with assembly_of(log, trust=trust) as assembly, on_signals() as stop:
         begin = start_of(log, assembly, start)
         if begin.period == 0:
             expected = {"physics": first_start(assembly, [log.member]).physics}
-            logged = {"time": np.zeros(1), "physics": begin.physics}
-            found = first_difference({"/state": logged}, {"/state": expected})
+            begun = {"time": np.zeros(1), "physics": begin.physics}
+            found = first_difference({"/state": begun}, {"/state": expected})
             if found is not None:
                 return dataclasses.replace(found, reason="the scenario begins otherwise")
-        for block in fly(assembly, begin, [log.member]):
+        for block in stop.breaking_off(fly(assembly, begin, [log.member])):
+            if stop():
+                raise Interrupted(stop.signal)
             flown = as_logged(one_vehicle(block), log.topics)
             _check_topics(log, block)
             logged = log.read_topics(dict.fromkeys(flown), start=block.time[0], end=block.time[-1])
@@ -149,23 +164,29 @@ def _other_streams(log: Log, scenario: Scenario) -> str:
 
 @contextmanager
 def assembly_of(
-    log: Log, law: Component | None = None, folder: Path = Path()
+    log: Log, law: Component | None = None, folder: Path = Path(), *, trust: bool = False
 ) -> Iterator[Assembly]:
     """Yield the assembly that flew in ``log``, or the same under another ``law``.
 
-    The scenario, the compiled model and the user's files all come from the log.
+    The scenario, the compiled model and the user's files all come from the log. They run with
+    ``trust`` alone.
 
     Raises:
-        InputError: the log lacks one of them, the law cannot be built, or another version packed
-            the environment into the state differently.
+        InputError: the log lacks one of them, or they are not trusted; the law cannot be built, or
+            another version packed the environment into the state differently.
     """
     with input_error_at("log"):
         scenario = scenario_of(log)
     if law is not None:
         scenario = _without_signals_of_the_law(scenario).model_copy(update={"law": law})
+    with input_error_at("log"):
+        code = code_of(log, scenario, law=law is None)
+    if not trust:
+        require_trust(code)
     with tempfile.TemporaryDirectory() as own:
-        _unpack(log, Path(own))
-        assembly = assemble(scenario, Path(own), law_folder=None if law is None else folder)
+        unpack(code, Path(own))
+        law_folder = None if law is None else folder
+        assembly = assemble(scenario, Path(own), trust=trust, law_folder=law_folder)
         model = logged_model(
             assembly.vehicle.model,
             log.attachment("model.mjb.gz"),
@@ -173,18 +194,6 @@ def assembly_of(
             log.shape("/state", "physics"),
         )
         yield dataclasses.replace(assembly, vehicle=vehicle.on_model(assembly.vehicle, model))
-
-
-def _unpack(log: Log, own: Path) -> None:
-    """Write the user's files that the log holds, ``law.py`` or ``law/helpers.py``."""
-    for name in log.attachments:
-        if name.partition("/")[0].removesuffix(".py") not in SOURCES:
-            continue
-        file = own / name
-        if not file.resolve().is_relative_to(own.resolve()):
-            raise InputError(f"log: the attachment {name!r} leads out of its folder")
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(log.attachment(name))
 
 
 def _without_signals_of_the_law(scenario: Scenario) -> Scenario:
@@ -207,13 +216,12 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
             raised, with the line of the user's code.
     """
     period = assembly.scenario.rates.control
+    if not log.start - 0.5 * period <= time <= log.end + 0.5 * period:
+        raise InputError(f"t = {time:g} s is not in the log: it has {log.start:g} to {log.end:g} s")
     number = round(time / period)
     near = (number - 0.5) * period, (number + 0.5) * period
     row = log.read("/state", None, *near)
     if len(row["time"]) != 1:
-        if not log.start <= time <= log.end:
-            has = f"{log.start:g} to {log.end:g} s"
-            raise InputError(f"t = {time:g} s is not in the log: it has {has}")
         found = float(log.nearest("/state", time)["time"])
         raise InputError(
             f"t = {time:g} s has no logged state: /state is logged every "
@@ -246,7 +254,7 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
             template = assembly.law.reset(
                 measurement, type(desired)(*(values[0] for values in desired))
             )
-        except Exception as error:
+        except BaseException as error:
             raise InputError(f"log: {failure('the law', error)}") from error
         fields = getattr(template, "_fields", ())
         names = [logged_name(f"law_{field}", state) for field in fields]

@@ -6,9 +6,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from mjspace.errors import printable
+from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.runner.checks import Verdict
+from mjspace.runner.logged_code import code_of, digest
 from mjspace.runner.run import Result
+
+LINES_SHOWN = 5
+"""Of each file of code in a log."""
 
 
 def print_result(result: Result) -> None:
@@ -22,7 +28,7 @@ def print_result(result: Result) -> None:
         table.add_column("verdict")
         for verdict in result.verdicts:
             table.add_row(
-                escape(verdict.check.name),
+                _shown(verdict.check.name),
                 "-" if verdict.missing else f"{verdict.measured:.4g}",
                 verdict.bound,
                 _word(verdict),
@@ -32,7 +38,7 @@ def print_result(result: Result) -> None:
             if verdict.missing or verdict.check.because:
                 console.print(verdict.line, style=_style(verdict), markup=False, highlight=False)
     if result.trouble:
-        console.print(f"[bold red]ended early:[/] {escape(result.trouble)}", highlight=False)
+        console.print(f"[bold red]ended early:[/] {_shown(result.trouble)}", highlight=False)
 
 
 def _word(verdict: Verdict) -> str:
@@ -87,6 +93,7 @@ def log_data(log: Log) -> dict[str, Any]:
         "units": log.units,
         "every": log.every,
         "attachments": sorted(log.attachments),
+        "code": {name: digest(code) for name, code in _code(log).items()},
         "events": [
             {"time": time, "level": level, "message": message}
             for time, _, level, message in log.events()
@@ -101,7 +108,7 @@ def print_log(log: Log) -> None:
     console.print(f"{log.start:g} to {log.end:g} s, {whole}", highlight=False)
     table = Table(box=None, pad_edge=False, show_header=False)
     for key, value in log.metadata.items():
-        table.add_row(key, escape(value))
+        table.add_row(_shown(key), _shown(value))
     for topic, fields in log.topics.items():
         units = log.units[topic]
         listed = []
@@ -111,14 +118,39 @@ def print_log(log: Log) -> None:
         often = ""
         if log.every[topic] > 1:
             often = f"every {log.every[topic] * log.control_period:g} s: "
-        table.add_row(topic, escape(often + ", ".join(listed)))
-    table.add_row("attachments", ", ".join(sorted(log.attachments)))
+        table.add_row(topic, _shown(often + ", ".join(listed)))
+    table.add_row("attachments", _shown(", ".join(sorted(log.attachments))))
     altered = log.altered()
     if altered is not None:
         changed = f"[bold red]{', '.join(altered)} changed since the flight[/]"
         table.add_row("digests", changed if altered else "every topic as it was written")
     console.print(table)
     for time, _, level, message in log.events():
+        line = printable(f"{time:12.6f} s  {level:7}  {message}")
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    _print_code(console, log)
+
+
+def _print_code(console: Console, log: Log) -> None:
+    """Print the name, the digest and the first lines of what ``replay --trust`` would run."""
+    for name, content in _code(log).items():
         console.print(
-            f"{time:12.6f} s  {level:7}  {message}", highlight=False, markup=False, soft_wrap=True
+            f"{name}, sha256 {digest(content)}: runs only with --trust; it begins",
+            highlight=False,
+            markup=False,
         )
+        for line in content.decode(errors="replace").splitlines()[:LINES_SHOWN]:
+            console.print(f"    {printable(line)}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _code(log: Log) -> dict[str, bytes]:
+    """Return the code in the log by name; none where its scenario cannot be flown anyway."""
+    try:
+        return code_of(log, scenario_of(log))
+    except ValueError:
+        return {}
+
+
+def _shown(text: str) -> str:
+    """Return a text from outside as a cell of a table."""
+    return escape(printable(text))

@@ -6,11 +6,12 @@ from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
 
-from mjspace.errors import FlightError
+from mjspace.errors import FlightError, InputError, is_file_name, shortened, users_place_of
+from mjspace.interrupts import Interrupted, on_signals
 from mjspace.log.reader import Log
 from mjspace.runner.checks import Verdict, refuse_other_dimensions, refuse_unknown
 from mjspace.runner.flight_log import units_of
-from mjspace.runner.interrupts import on_signals
+from mjspace.runner.output import LOG, refuse_existing, remove
 from mjspace.runner.recorder import Recorder
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
@@ -52,12 +53,16 @@ def run(
     *,
     overrides: Iterable[str] = (),
     out: str | Path | None = None,
+    trust: bool = False,
+    force: bool = False,
     progress: Progress = lambda time: None,
 ) -> Result:
     """Fly a scenario, by name or path, and judge it; the log is ``flight.mcap`` in ``out``.
 
     ``overrides`` are ``"key=value"``, as ``--set`` takes them; ``out`` is
-    ``runs/<scenario>/<UTC stamp>`` when left out.
+    ``runs/<scenario>/<UTC stamp>`` when left out. With ``trust`` the scenario may name files
+    outside its folder and any installed module. A log that is there already is replaced with
+    ``force`` alone.
 
     Raises:
         InputError: bad input, in one line; nothing has been written.
@@ -65,14 +70,21 @@ def run(
         OSError: the log cannot be written (any more); it keeps what it has.
     """
     loaded, folder = load(scenario, overrides)
-    assembly = assemble(loaded, folder)
-    return fly_to_log(assembly, output_folder(out, loaded.name) / "flight.mcap", progress=progress)
+    assembly = assemble(loaded, folder, trust=trust)
+    path = output_folder(out, loaded.name) / LOG
+    return fly_to_log(assembly, path, force=force, progress=progress)
 
 
 def output_folder(out: str | Path | None, name: str) -> Path:
-    """Return where a run called ``name`` writes."""
+    """Return where a run called ``name`` writes.
+
+    Raises:
+        InputError: a name, as that of a log's scenario, which no folder can have.
+    """
     if out is not None:
         return Path(out)
+    if not is_file_name(name):
+        raise InputError(f"{shortened(name)!r} is no name of a folder: give one by --out")
     return Path("runs") / name / datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
 
 
@@ -82,26 +94,33 @@ def fly_to_log(
     *,
     member: int = 0,
     start: Start | None = None,
+    force: bool = False,
     progress: Progress = lambda time: None,
 ) -> Result:
     """Fly one member of the scenario, from ``start`` or time zero, into a new log, and judge it.
 
     Raises:
         InputError: a check of the scenario names no signal of this flight, or has a bound of
-            another dimension; nothing is written.
+            another dimension; ``path`` is there already, and not to be replaced by ``force``, or
+            another run writes it. Nothing is written.
         FlightError: it could not even begin.
         OSError: the log cannot be written (any more); it keeps what it has.
+
+    A signal that ends it before it has begun is obeyed as elsewhere.
     """
+    refuse_existing(path, force=force)
     start = start or first_start(assembly, [member])
-    trouble, ended_by = "", None
+    trouble, where, ended_by = "", "", None
     with on_signals() as stop, Recorder(assembly) as recorder:
-        blocks = fly(assembly, start, [member], stop=stop)
+        blocks = stop.breaking_off(fly(assembly, start, [member], stop=stop))
         first = next(blocks)
         checks, topics = assembly.scenario.checks, shapes(first)
         refuse_unknown(checks, topics)
         units = units_of(assembly, first.kinds)
         refuse_other_dimensions(checks, assembly.scenario.events, topics, units)
         path.parent.mkdir(parents=True, exist_ok=True)
+        if force:
+            remove(path)
         recorder.begin(path, member, first)
         try:
             for block in chain([first], blocks):
@@ -109,8 +128,11 @@ def fly_to_log(
                 progress(float(block.time[-1]))
         except FlightError as error:
             trouble, ended_by = str(error), error
+        except Interrupted as error:
+            where = users_place_of(error)
         if stop():
             trouble = f"interrupted by signal {stop.signal} at t = {recorder.time:.6g} s"
+            trouble += f": {where} did not return" if where else ""
         if trouble:
             recorder.event("ERROR", trouble)
         verdicts = recorder.verdicts()

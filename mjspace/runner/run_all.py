@@ -9,7 +9,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from mjspace.interrupts import on_signals
 from mjspace.runner import report, run, workers
+from mjspace.runner.output import LOG, refuse_existing
 from mjspace.runner.run import Progress
 from mjspace.scenario.loading import load
 
@@ -32,32 +34,44 @@ class Outcome:
 
 
 def fly(
-    names: Sequence[str], overrides: Sequence[str], out: Path, progress: Progress
-) -> list[Outcome]:
-    """Fly the scenarios, each into a folder of its name in ``out``; return them in their order.
+    names: Sequence[str],
+    overrides: Sequence[str],
+    out: Path,
+    progress: Progress,
+    *,
+    force: bool = False,
+) -> tuple[list[Outcome], int]:
+    """Fly the scenarios, each into a folder of its name in ``out``.
+
+    Return their outcomes in their order, and the signal that ended it, 0 for none: then those of
+    the scenarios that had begun.
 
     Raises:
-        InputError: an override that a scenario does not take; what flies already goes on.
+        InputError: an override that a scenario does not take, or a log that is there already.
+        FlightError: a process that flies was killed.
         OSError: a log cannot be written.
     """
     scenarios = [load(name, overrides)[0] for name in names]
     costs = [s.duration / s.rates.physics for s in scenarios]
     longest_first = sorted(range(len(names)), key=lambda i: -costs[i])
-    calls = [(_flown, (names[i], tuple(overrides), out / names[i])) for i in longest_first]
+    for name in names:
+        refuse_existing(out / name / LOG, force=force)
+    calls = [(_flown, (names[i], tuple(overrides), out / names[i], force)) for i in longest_first]
     outcomes, done = {}, 0.0
-    for index, outcome in workers.each(calls):
-        place = longest_first[index]
-        outcomes[place] = outcome
-        done += costs[place]
-        progress(done / sum(costs))
-    return [outcomes[place] for place in range(len(names))]
+    with on_signals() as stop:
+        for index, outcome in workers.each(calls, stop):
+            place = longest_first[index]
+            outcomes[place] = outcome
+            done += costs[place]
+            progress(done / sum(costs))
+    return [outcomes[place] for place in sorted(outcomes)], stop.signal
 
 
-def _flown(call: tuple[str, tuple[str, ...], Path]) -> Outcome:
-    name, overrides, out = call
+def _flown(call: tuple[str, tuple[str, ...], Path, bool]) -> Outcome:
+    name, overrides, out, force = call
     scenario, _ = load(name, overrides)
     began = time.perf_counter()
-    result = report.result_data(run.run(name, overrides=overrides, out=out))
+    result = report.result_data(run.run(name, overrides=overrides, out=out, force=force))
     seconds = time.perf_counter() - began
     return Outcome(name, scenario.description, result, seconds)
 

@@ -1,46 +1,23 @@
 """Construct a law or a reference from its name and gains: find the class, check, convert."""
 
 import dataclasses
-import functools
-import importlib
 import inspect
-import pkgutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
-from types import ModuleType
 from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
-from mjspace.errors import nearest
+from mjspace.errors import failure, nearest, shortened
 from mjspace.ranges import numbers, refuse_unfit
 from mjspace.scenario.gain_tables import columns
 from mjspace.scenario.scenario import Component
-from mjspace.scenario.user_files import load_file
+from mjspace.scenario.trust import Trust
 from mjspace.units import quantity_in, to_si
 
 
-def load_object(kind: str, folder: Path) -> Any:
-    """Return what ``"module:Name"`` or ``"file.py:Name"`` names.
-
-    A file is looked up from ``folder``; a module in mjspace.controllers first, then anywhere.
-
-    Raises:
-        ValueError: no such module, file or name, with the near ones.
-    """
-    place, _, name = kind.partition(":")
-    if not place or not name:
-        raise ValueError(f"{kind!r}: write 'module:Class' or 'file.py:Class'")
-    module = load_file(folder / place) if place.endswith(".py") else _import(place)
-    if not hasattr(module, name):
-        have = [key for key, value in vars(module).items() if inspect.isclass(value)]
-        raise ValueError(f"{place!r} has no {name!r}{nearest(name, have)}")
-    return getattr(module, name)
-
-
 def construct(
-    component: Component, kind: type, facts: Mapping[str, Any], folder: Path
+    component: Component, kind: type, facts: Mapping[str, Any], trust: Trust
 ) -> tuple[Any, Component]:
     """Return the object of class ``kind`` with the component's gains, and the component as flown.
 
@@ -55,11 +32,14 @@ def construct(
     """
     gains = component.gains
     if "file" in gains:
-        read = columns(folder / str(gains.pop("file")))
+        file = gains.pop("file")
+        if not isinstance(file, str):
+            raise ValueError(f"file: got {shortened(repr(file))}, should be text")
+        read = columns(trust.file(file))
         if both := sorted(read.keys() & gains.keys()):
             raise ValueError(f"{both[0]}: stands both here and in the file: leave one out")
         gains |= read
-    values, written = _tables_in(kind, gains, facts, folder)
+    values, written = _tables_in(kind, gains, facts, trust)
     built, flown = _build(kind, component.kind, values, written, facts)
     return built, Component(kind=component.kind, **flown)
 
@@ -94,13 +74,18 @@ def _build(
         else:
             _refuse_unlike(name, value, parameters[name].annotation, name_of_kind)
     refuse_unfit(values, declared)
-    built = kind(**values)
+    try:
+        built = kind(**values)
+    except ValueError:
+        raise
+    except BaseException as error:
+        raise ValueError(str(failure("it", error))) from error
     flown = {name: plain(getattr(built, name, values.get(name))) for name in parameters}
     return built, flown | dict(written)
 
 
 def _tables_in(
-    kind: type, gains: Mapping[str, Any], facts: Mapping[str, Any], folder: Path, at: str = ""
+    kind: type, gains: Mapping[str, Any], facts: Mapping[str, Any], trust: Trust, at: str = ""
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the gains with the tables in them constructed, and those gains as flown.
 
@@ -111,7 +96,7 @@ def _tables_in(
     for name, gain in gains.items():
         table = table_of(parameters[name].annotation) if name in parameters else None
         if table is not None or _has_kind(gain):
-            values[name], written[name] = _within(f"{at}{name}", gain, table, facts, folder)
+            values[name], written[name] = _within(f"{at}{name}", gain, table, facts, trust)
     return values, written
 
 
@@ -130,23 +115,23 @@ def table_of(annotation: Any) -> type | None:
 
 
 def _within(
-    key: str, value: Any, table: type | None, facts: Mapping[str, Any], folder: Path
+    key: str, value: Any, table: type | None, facts: Mapping[str, Any], trust: Trust
 ) -> tuple[Any, Any]:
     """Return the gain with every table in it constructed, and as flown.
 
     A table without a ``kind`` is one of the dataclass ``table``, if any.
     """
     if isinstance(value, list):
-        pairs = [_within(f"{key}.{n}", item, table, facts, folder) for n, item in enumerate(value)]
+        pairs = [_within(f"{key}.{n}", item, table, facts, trust) for n, item in enumerate(value)]
         return [built for built, _ in pairs], [flown for _, flown in pairs]
     if not isinstance(value, Mapping):
         return value, value
     if "kind" not in value:
         if table is not None:
-            values, written = _tables_in(table, value, facts, folder, f"{key}.")
+            values, written = _tables_in(table, value, facts, trust, f"{key}.")
             with _at(key):
                 return _build(table, table.__name__, values, written, facts)
-        items = {n: _within(f"{key}.{n}", v, None, facts, folder) for n, v in value.items()}
+        items = {n: _within(f"{key}.{n}", v, None, facts, trust) for n, v in value.items()}
         return {n: built for n, (built, _) in items.items()}, {
             n: flown for n, (_, flown) in items.items()
         }
@@ -159,7 +144,7 @@ def _within(
                 f"{inner.kind}: a law within another comes from a module, as the log "
                 "keeps the text of one file alone"
             )
-        built, flown = construct(inner, load_object(inner.kind, folder), facts, folder)
+        built, flown = construct(inner, trust.load_class(inner.kind), facts, trust)
     return built, {"kind": flown.kind, **flown.gains}
 
 
@@ -240,25 +225,3 @@ def _takes_text(annotation: Any) -> bool:
     if issubclass(get_origin(annotation) or object, Mapping):
         inside = inside[1:]
     return any(map(_takes_text, inside))
-
-
-@functools.cache
-def controllers() -> dict[str, str]:
-    """Return the full name of each module in controllers/ by the last part, as scenarios name it.
-
-    The folders there are for people: a law keeps its name when it moves to another.
-    """
-    package = importlib.import_module("mjspace.controllers")
-    found = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
-    return {each.name.rpartition(".")[2]: each.name for each in found if not each.ispkg}
-
-
-def _import(name: str) -> ModuleType:
-    have = controllers()
-    full = have.get(name.removeprefix("mjspace.controllers."), name)
-    try:
-        return importlib.import_module(full)
-    except ModuleNotFoundError as error:
-        if error.name is None or not full.startswith(error.name):
-            raise ValueError(f"{name!r} cannot be imported: {error}") from error
-    raise ValueError(f"no module {name!r}{nearest(name, sorted(have))}")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Self
 from pydantic import model_validator
 
 from mjspace.scenario.declared import DeclaredIn
-from mjspace.scenario.fields import Table
+from mjspace.scenario.fields import KindName, Table
 
 
 class Environment(Table):
@@ -28,7 +28,7 @@ class Environment(Table):
     ] = []
     """Evaluated at every stage of the integrator."""
     facet_drag: Annotated[Any, DeclaredIn("mjspace.environment.facet_drag:FacetDrag")] = None
-    python: str | None = None
+    python: KindName | None = None
     """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
     inertial axes, torque [N m] in body axes), held over each integration step: first order only."""
 

@@ -14,10 +14,14 @@ from pydantic import (
     GetJsonSchemaHandler,
     ValidationError,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
 )
 from pydantic_core import core_schema
 
+from mjspace.errors import is_file_name, shortened
 from mjspace.ranges import FORMS, Form
+from mjspace.scenario.trust import CommandLineText
 from mjspace.units import Unit, quantity, to_si
 
 _IN_PEOPLES_UNITS = {"rad": "deg", "rad/s": "deg/s", "m": "km", "s": "min"}
@@ -80,15 +84,30 @@ def of_form(form: Form) -> AfterValidator:
     return AfterValidator(validated)
 
 
+def _file_name(name: str) -> str:
+    if not is_file_name(name):
+        raise ValueError(f"got {shortened(name)!r}, should be a name that a folder can have")
+    return name
+
+
+def _marked(name: Any, inner: ValidatorFunctionWrapHandler) -> Any:
+    return name if isinstance(name, CommandLineText) else inner(name)
+
+
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
 Switch = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+KindName = Annotated[str, WrapValidator(_marked)]
+"""What names code. It stays marked as text of the command line."""
+FileName = Annotated[str, AfterValidator(_file_name)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
 Seconds = Annotated[Positive, Si("s")]
+Period = Annotated[Positive, Field(ge=1e-9), Si("s")]
+"""From one instant to another: a log's clock has nanoseconds, in 64 bits."""
 Time = Annotated[NonNegative, Si("s")]
 Angle = Annotated[Finite, Si("rad")]
 TWO_TURNS = Field(ge=-2.0 * math.pi, le=2.0 * math.pi)

@@ -1,15 +1,18 @@
 """Scenario files: found by name or path, read, and merged over their bases."""
 
 import difflib
-import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from mjspace.errors import InputError
+from mjspace.scenario import raw
 
 _HALLMARKS = {"base", "description", "duration", "reference", "law"}
 """Keys of which a scenario has the first or all others."""
+
+MOST_BASES = 20
+"""Files based on each other."""
 
 
 def scenario_names() -> list[str]:
@@ -51,8 +54,8 @@ def read(path: Path, upon: tuple[Path, ...] = ()) -> dict[str, Any]:
         InputError: it cannot be read, is not a scenario, or its base is not.
     """
     try:
-        table = tomllib.loads(path.read_text())
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        table = raw.parsed(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
         raise InputError(f"{path}: {error}") from None
     if not table.keys() & _HALLMARKS:
         have = ", ".join(table) or "nothing"
@@ -61,6 +64,8 @@ def read(path: Path, upon: tuple[Path, ...] = ()) -> dict[str, Any]:
     if "base" not in table:
         return table
     base, upon = table.pop("base"), (*upon, path.resolve())
+    if len(upon) > MOST_BASES:
+        raise InputError(f"{path}: base: more than {MOST_BASES} files are based on each other")
     if not isinstance(base, str):
         raise InputError(f"{path}: base: got {base!r}, should be a scenario's name or a path")
     try:

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from mjspace.errors import shortened
+
 
 def columns(path: Path) -> dict[str, Any]:
     """Return a CSV file's columns by their header; ``q0, q1, ...`` become one array ``q``.
@@ -22,8 +24,8 @@ def columns(path: Path) -> dict[str, Any]:
     names = [name.strip() for name in lines[0].lstrip("# ").split(",")] if lines else []
     if not names or not all(name.isidentifier() for name in names):
         raise ValueError(
-            f"file: {path}, line 1: got {', '.join(names)!r}, should be a header of the gains' "
-            "names, as in time,attitude0,attitude1,attitude2,attitude3"
+            f"file: {path}, line 1: got {shortened(', '.join(names))!r}, should be a header of the "
+            "gains' names, as in time,attitude0,attitude1,attitude2,attitude3"
         )
     rows = []
     for number, line in enumerate(lines[1:], start=2):
@@ -43,7 +45,9 @@ def columns(path: Path) -> dict[str, Any]:
     for base, parts in groups.items():
         right = [base] if parts == [base] else [f"{base}{i}" for i in range(len(parts))]
         if parts != right:
-            raise ValueError(f"file: {path}, line 1: got {parts}, should be {right}")
+            raise ValueError(
+                f"file: {path}, line 1: got {shortened(str(parts))}, should be {right}"
+            )
     table = dict(zip(names, np.array(rows).T.tolist(), strict=True))
     return {
         base: table[base] if parts == [base] else np.array([table[p] for p in parts]).T.tolist()
@@ -55,4 +59,6 @@ def _number(cell: str, path: Path, line: int) -> float:
     try:
         return float(cell)
     except ValueError:
-        raise ValueError(f"file: {path}, line {line}: got {cell!r}, should be a number") from None
+        raise ValueError(
+            f"file: {path}, line {line}: got {shortened(cell)!r}, should be a number"
+        ) from None

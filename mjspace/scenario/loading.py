@@ -9,7 +9,7 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel, ValidationError
 
-from mjspace.errors import InputError, nearest
+from mjspace.errors import InputError, nearest, shortened
 from mjspace.scenario import files
 from mjspace.scenario import overrides as keys
 from mjspace.scenario.construct import plain
@@ -122,7 +122,7 @@ def _explain(key: str, problem: Any) -> str:
     message = problem["msg"].replace("Input should", "should").replace("List should", "should")
     if problem["type"] in _SHOULD_BE:
         message = f"should be {_SHOULD_BE[problem['type']]}"
-    return f"{key}: got {problem['input']!r}, {message}"
+    return f"{key}: got {shortened(repr(problem['input']))}, {message}"
 
 
 def _keys_at(parents: list[Any]) -> list[str]:

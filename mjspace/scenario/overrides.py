@@ -4,7 +4,9 @@ import tomllib
 from collections.abc import Iterable
 from typing import Any
 
-from mjspace.errors import InputError
+from mjspace.errors import InputError, is_plain
+from mjspace.scenario import raw
+from mjspace.scenario.trust import CommandLineText
 
 _COMPONENTS = ("law", "reference")
 
@@ -34,10 +36,25 @@ def _parsed(override: str, option: str) -> tuple[str, str, Any]:
     key = key.strip()
     if not equals or not key:
         raise InputError(f"{option} {override}: write key=value")
+    if not is_plain(override):
+        raise InputError(f"{option} {override}: control characters")
+    if key.count(".") >= raw.DEEPEST:
+        raise InputError(f"{option} {override}: the key has too many parts")
     try:
-        return override, key, tomllib.loads(f"value = {text}")["value"]
+        return override, key, _of_command_line(raw.parsed(f"value = {text}")["value"])
     except tomllib.TOMLDecodeError:
-        return override, key, text.strip()
+        return override, key, CommandLineText(text.strip())
+    except ValueError as error:
+        raise InputError(f"{option} {override}: {error}") from None
+
+
+def _of_command_line(value: Any) -> Any:
+    """Return a TOML value with its texts marked."""
+    if isinstance(value, dict):
+        return {key: _of_command_line(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_of_command_line(item) for item in value]
+    return CommandLineText(value) if isinstance(value, str) else value
 
 
 def _turn(key: str) -> tuple[bool, int]:

@@ -14,10 +14,10 @@ from mjspace.scenario.fields import (
     Momentum3,
     Name,
     NonNegative,
+    Period,
     Positive,
     Quaternion,
     Rate3,
-    Seconds,
     Si,
     Table,
     Velocity3,
@@ -29,9 +29,9 @@ from mjspace.units import whole_number
 class Rates(Table):
     """How often things happen."""
 
-    physics: Seconds = 1e-3
+    physics: Period = 1e-3
     """Integration step."""
-    control: Seconds = 1e-3
+    control: Period = 1e-3
     """Control period, a whole number of integration steps: law, actuators and log."""
     integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = "RK4"
     """MuJoCo's integrator; all but RK4 are first order, and are warned of."""

@@ -18,7 +18,7 @@ from mjspace.contract import TICK
 from mjspace.ranges import numbers
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Count, Seconds, Switch, Table, Time
+from mjspace.scenario.fields import Count, FileName, KindName, Positive, Si, Switch, Table, Time
 from mjspace.scenario.log_rates import LogRates
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
@@ -31,8 +31,8 @@ class Component(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    kind: str
-    """``"module:Class"`` in controllers/, or ``"path/to/file.py:Class"`` beside the scenario."""
+    kind: KindName
+    """``"module:Class"`` in controllers/, or ``"file.py:Class"`` in the scenario's folder."""
 
     @property
     def gains(self) -> dict[str, Any]:
@@ -150,15 +150,15 @@ class Check(SignalRegion):
 class Scenario(Table):
     """One flight, whole: what flies, where, under which law, how long, and what it must show."""
 
-    name: str = ""
-    """The file's name when left out."""
+    name: FileName = ""
+    """Of the folder of its logs; the file's name when left out."""
     description: str
     """One line: what the flight shows."""
     source: str = ""
     """Where its numbers come from."""
     seed: Count = 0
     """Of every random stream."""
-    duration: Seconds
+    duration: Annotated[Positive, Field(le=9e9), Si("s")]
     """Simulated time."""
     rates: Rates = Rates()
     plant: PlantTable = Field(default_factory=PlantTable)

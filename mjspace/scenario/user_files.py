@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
+from mjspace.errors import pass_on_signals
+
 DATA_FILES = "DATA_FILES"
 """What a user's module calls the tuple of names of the files beside it that it reads."""
 _SOURCE, _BESIDE = "_mjspace_source", "_mjspace_beside"  # texts, as the files may be gone later
@@ -44,8 +46,9 @@ def load_file(path: Path) -> ModuleType:
         setattr(module, _BESIDE, files)
         with _importable(path.parent.resolve(), files):
             spec.loader.exec_module(module)
-    except Exception as error:
+    except BaseException as error:
         del sys.modules[name]
+        pass_on_signals(error)
         raise ValueError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
     return module
 
@@ -79,7 +82,7 @@ def beside(path: Path) -> dict[str, bytes]:
 def source_of(kind: type) -> str:
     """Return the text of the file that defines ``kind``."""
     text: str | None = getattr(sys.modules[kind.__module__], _SOURCE, None)
-    return text if text is not None else Path(inspect.getfile(kind)).read_text()
+    return text if text is not None else Path(inspect.getfile(kind)).read_text(encoding="utf-8")
 
 
 def files_of(kind: type) -> dict[str, bytes]:

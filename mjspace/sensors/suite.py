@@ -14,6 +14,9 @@ from mjspace.sensors.base import Sensor, State, Surroundings
 from mjspace.sensors.noise import normals, stream_of
 from mjspace.units import whole_number
 
+MOST_SAMPLES = 10000
+"""That a delay keeps."""
+
 
 class SensorSuite:
     """The sensors of a batch of vehicles: fixed errors and streams, all memory in ``State``.
@@ -200,6 +203,11 @@ def _sampled(
     if not (table.errs or table.integrates or table.delay or rates.steps % period):
         return None
     delay = table.delay and whole_number(table.delay, seconds, f"sensors.{name}.delay", period_key)
+    if delay > MOST_SAMPLES:
+        raise ValueError(
+            f"sensors.{name}.delay: {table.delay:g} s is {delay:g} times {period_key}: at most "
+            f"{MOST_SAMPLES}, as each sample is kept and logged"
+        )
     width = wheels if table.width is None else table.width
     axes = width if table.axes is None else table.axes
     stream = stream_of(name)

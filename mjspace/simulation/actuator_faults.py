@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array
 from mjspace.simulation.assembly import Assembly
-from mjspace.vehicle.step_effect import Instant, State, StepEffect
+from mjspace.vehicle.step_effect import Instant, State, StepEffect, Topics
 
 
 class ActuatorFaults(StepEffect):
@@ -23,6 +23,9 @@ class ActuatorFaults(StepEffect):
     def __init__(self, faults: FaultSet, *, between: bool) -> None:
         """Keep the ``faults``; ``between``: one begins or ends between control instants."""
         self._faults, self._between = faults, between
+        # Its random numbers are drawn in each step.
+        self.waits = faults.waiting
+        self.not_compiled = "a noisy motor is called in Python" if faults.noisy else ""
 
     def reset(self, physics: Array) -> State:
         """Return the faults' state at the start, ``FaultSet.reset``."""
@@ -48,3 +51,11 @@ class ActuatorFaults(StepEffect):
             memory, events = self._faults.decide(memory, instant.time, None)
             instant.events.extend(events)
         return self._faults.change(memory, applied, instant.time)
+
+    def alarm(self, memory: State, topics: Topics) -> Array:
+        """Return where a fault begins by a signal."""
+        return self._faults.alarm(memory, topics)
+
+    def due(self, after: float) -> float:
+        """Return when the next fault begins or ends by the time."""
+        return self._faults.due(after)

@@ -16,8 +16,9 @@ from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.environment.install import userdata, userdata_size
 from mjspace.environment.orbit import orbit_position
 from mjspace.errors import input_error_at
-from mjspace.scenario.construct import construct, load_object
+from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component, Scenario
+from mjspace.scenario.trust import Trust
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import Surroundings
 from mjspace.sensors.suite import SensorSuite
@@ -117,11 +118,17 @@ class Assembly:
 
 
 def assemble(
-    scenario: Scenario, folder: Path, *, law_folder: Path | None = None, inner: bool = True
+    scenario: Scenario,
+    folder: Path,
+    *,
+    trust: bool = False,
+    law_folder: Path | None = None,
+    inner: bool = True,
 ) -> Assembly:
     """Return the scenario's assembly; ``folder`` holds the files that it names.
 
-    The law's own file is in ``law_folder``, if any. Without ``inner`` the actuators are commanded
+    With ``trust`` it may name files elsewhere and any installed module: see ``Trust``. A law from
+    ``law_folder``, where there is one, is trusted. Without ``inner`` the actuators are commanded
     once in a control period, also where the law has an inner loop.
 
     Raises:
@@ -140,16 +147,16 @@ def assemble(
         facts |= table.facts(vehicle)
     flown: dict[str, Any] = {}
     sources: dict[str, bytes] = {}
-    law, flown["law"] = _component("law", scenario.law, facts, law_folder or folder, sources)
-    reference, flown["reference"] = _component(
-        "reference", scenario.reference, facts, folder, sources
-    )
+    own = Trust(folder, everything=trust)
+    of_law = own if law_folder is None else Trust(law_folder, everything=True)
+    law, flown["law"] = _component("law", scenario.law, facts, of_law, sources)
+    reference, flown["reference"] = _component("reference", scenario.reference, facts, own, sources)
     _part("reference", reference.at, np.array([0.0, scenario.duration]))
     inner = inner and _part("law", _has_inner_loop, law)
     disturbance = None
     kind = scenario.environment.python
     if kind is not None:
-        disturbance = _part("environment.python", _function, kind, folder)
+        disturbance = _part("environment.python", own.load, kind)
         flown["environment"] = scenario.environment.model_copy(
             update={"python": _in_log("disturbance", kind, disturbance, sources)}
         )
@@ -183,15 +190,12 @@ def assemble(
 
 
 def _component(
-    role: str, component: Component, facts: dict[str, Any], folder: Path, sources: dict[str, bytes]
+    role: str, component: Component, facts: dict[str, Any], trust: Trust, sources: dict[str, bytes]
 ) -> tuple[Any, Component]:
     """Return the law or reference and its table as flown; its files are added to ``sources``."""
     with input_error_at(role):
-        kind = load_object(component.kind, folder)
-        built, flown = construct(component, kind, facts, folder)
-        for method in METHODS[role]:
-            if not callable(getattr(built, method.partition("(")[0], None)):
-                raise ValueError(f"{component.kind} has no method {method}")
+        kind = trust.load_class(component.kind, METHODS[role])
+        built, flown = construct(component, kind, facts, trust)
     return built, flown.model_copy(update={"kind": _in_log(role, component.kind, kind, sources)})
 
 
@@ -204,14 +208,6 @@ def _has_inner_loop(law: Any) -> bool:
             "a leading vehicle axis, and set its attribute batched = True"
         )
     return has
-
-
-def _function(kind: str, folder: Path) -> Callable[..., Any]:
-    """Return the function that ``kind`` names; ValueError for anything else."""
-    found = load_object(kind, folder)
-    if not callable(found):
-        raise ValueError(f"{kind} is not a function of (time, truth): {type(found).__name__}")
-    return found  # type: ignore[no-any-return]
 
 
 def _in_log(role: str, kind: str, found: Any, sources: dict[str, bytes]) -> str:

@@ -5,6 +5,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mjspace.actuators.actuator_set import ActuatorSet
+from mjspace.contract import Array
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 
@@ -13,6 +14,7 @@ class BurningMass(StepEffect):
 
     name: ClassVar[str] = "the burning mass"
     every_step: ClassVar[bool] = True
+    not_compiled = ""
 
     @classmethod
     def of(cls, actuators: ActuatorSet) -> Self | None:
@@ -35,10 +37,14 @@ class BurningMass(StepEffect):
         The constants that MuJoCo derives from them take 0.6 of a step's time: they are derived
         again only where something burns.
         """
-        changes = self._actuators.masses(instant.memory, memory)
+        changes = self.masses(instant.memory, memory)
         fields = [(self._batch.expand(name)[:, body], values) for name, body, values in changes]
         if any(not np.array_equal(field, values) for field, values in fields):
             for field, values in fields:
                 field[:] = values
             self._batch.set_const()
         return memory
+
+    def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
+        """Return the masses and inertias in the middle of the step."""
+        return self._actuators.masses(before, after)

@@ -4,7 +4,8 @@ What it computes is then a list of calls of NumPy's loops on one memory, which a
 repeats without Python.
 """
 
-from collections.abc import Iterator
+import copy
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,39 +13,42 @@ import numpy as np
 
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
+from mjspace.interrupts import Interrupted
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.hidden_memory import refusing_hidden_memory
-from mjspace.simulation.period_program import Copies, PeriodProgram, Recorded
+from mjspace.simulation.period_program import PeriodProgram, Recorded, Section
 from mjspace.simulation.state_layout import StateLayout
+from mjspace.simulation.traced_arrays import TracedArrays, changes, tuple_like
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.tracing.inner_loops import Untraceable
-from mjspace.tracing.program import Calls, Program
 from mjspace.tracing.replay import prove
-from mjspace.tracing.traced_array import TracedArray
+from mjspace.vehicle.step_effect import Instant, StepEffect, Write
 
 
 def compile_period(
     assembly: Assembly,
     layout: StateLayout,
+    effects: Sequence[StepEffect],
     example: ControlPeriod,
     reference: DesiredMotion,
     *,
     law: bool,
+    sensors: bool = True,
 ) -> PeriodProgram:
     """Return the program of a period like the ``example``, at which ``reference`` is desired.
 
-    Without ``law`` it begins with the law's command.
+    Without the ``law``, which is then called between sensors and actuators; or without both.
 
     Raises:
-        Untraceable: the law or an actuator does what cannot be taken down, and where.
+        Untraceable: the law or another part does what cannot be taken down, and where.
     """
     try:
         with np.errstate(all="ignore"):
-            tracing = _Tracing(assembly, layout, example, reference)
+            tracing = _Tracing(assembly, layout, effects, example, reference)
             if not law:
-                return tracing.of_command(example.command)
+                return tracing.of_command(example, sensors=sensors)
             with refusing_hidden_memory(tracing.law) as tracing.law:
                 return tracing.with_law()
     except (FlightError, TypeError, ValueError) as error:
@@ -52,33 +56,35 @@ def compile_period(
         raise Untraceable(str(error)) from error
 
 
-class _Tracing:
+class _Tracing(TracedArrays):
     """The arrays that a period begins with, in a program's memory."""
 
     def __init__(
         self,
         assembly: Assembly,
         layout: StateLayout,
+        effects: Sequence[StepEffect],
         example: ControlPeriod,
         reference: DesiredMotion,
     ) -> None:
-        self.assembly, self.layout = assembly, layout
-        self.program = program = Program()
-        self.time = program.copied(_elsewhere(example.time))
-        self.physics = program.copied(_elsewhere(example.physics[:1]))
-        self.sensordata = program.copied(_elsewhere(example.sensordata[:1]))
-        self.reference = type(reference)(*(program.copied(_elsewhere(a)) for a in reference))
-        self.memory = {name: self._held(array) for name, array in example.memory.items()}
-        self.law_state = _tuple_like(example.law, map(self._held, example.law))
-        self.inputs = [self.time, self.physics, *self.memory.values(), *self.law_state]
-        self.inputs += self.reference
-        self.sensors = {name: self._held(array) for name, array in example.sensors.items()}
+        super().__init__()
+        self.assembly, self.layout, self.effects = assembly, copy.copy(layout), effects
+        self.time = self.held(example.time)
+        instant = np.array([example.time])
+        self.known = tuple(self.held(effect.known(instant)[0]) for effect in effects)
+        for effect, known in zip(effects, self.known, strict=True):
+            self.layout.surroundings = effect.around(self.layout.surroundings, self.traced(known))
+        self.physics = self.held(example.physics[:1])
+        self.sensordata = self.held(example.sensordata[:1])
+        self.reference = tuple_like(reference, map(self.held, reference))
+        self.memory = self._held_arrays(example.memory)
+        self.law_state = tuple_like(example.law, map(self.held_of_one, example.law))
+        self.sensors = self._held_arrays(example.sensors)
         suite = assembly.sensors([0])
-        self.biases = {name: self._held(array) for name, array in suite.biases.items()}
-        self.draws = {name: self._held(array[0]) for name, array in suite.draws([1]).items()}
-        self.inputs += [*self.sensors.values(), *self.biases.values(), *self.draws.values()]
+        self.biases = self._held_arrays(suite.biases)
+        self.draws = self._held_arrays({name: a[0] for name, a in suite.draws([1]).items()})
         self.suite = suite.with_errors(
-            self._traced_arrays(self.biases), self._traced_arrays(self.draws)
+            self.traced_arrays(self.biases), self.traced_arrays(self.draws)
         )
         law = assembly.law
         self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
@@ -89,37 +95,29 @@ class _Tracing:
         Raises:
             Untraceable: as ``compile_period``; or sensors sample at times of their own.
         """
-        steps = self.assembly.scenario.rates.steps
-        if self.suite.ticks - {steps}:
-            raise Untraceable("sensors sample at other times than the control instants")
         before = tuple(self.sensors.values())
         with self.program.section() as sensing:
-            # Not of sample 0, which integrating sensors begin with.
-            sampled, measurement = self.suite.sample(
-                self._traced_arrays(self.sensors), steps, self._truth()
-            )
-            after = self._next(before, tuple(sampled[name] for name in self.sensors))
-            reports = self._reports(measurement)
+            after, measurement = self._sample()
+            # Of ideal sensors a block computes it for all of its periods at once.
+            reports = self._reports(measurement) if self.suite.ticks else []
             state, command, signals = self._law_step(measurement)
-            state = self._next(self.law_state, state)
-            command, signals = self._numbers(command), self._numbers(signals)
+            state = self.following(self.law_state, state)
+            alarms = self._alarms(measurement, command, signals)
+            command, signals = self.numbers(command), self.numbers(signals)
         prove(sensing[0], self.program.memory)
-        changes = _changes(self.law_state, state) + _changes(before, after)
-        for target, source in changes:
+        changed = changes(self.law_state, state) + changes(before, after)
+        for target, source in changed:
             target[...] = source
         recorded = [*_recorded("law", self.law_state), *_recorded("signals", signals)]
-        recorded += [Recorded("sensors", name, array) for name, array in self.sensors.items()]
-        recorded += reports
         return self._compiled(
             command,
-            sensing=sensing[0],
-            after_sensing=changes,
-            recorded=recorded,
+            sensing=Section(sensing[0], changed, alarms),
+            recorded=[*recorded, *_recorded("command", command), *reports],
             kinds={"law": type(self.law_state), "signals": type(signals)},
         )
 
-    def of_command(self, command: Any) -> PeriodProgram:
-        """Return the program of the actuators under the law's ``command``.
+    def of_command(self, example: ControlPeriod, *, sensors: bool) -> PeriodProgram:
+        """Return the program of the actuators under the law's command, and of the ``sensors``.
 
         Raises:
             Untraceable: as ``compile_period``; or the law has an inner loop.
@@ -128,50 +126,58 @@ class _Tracing:
             raise Untraceable("the law has an inner loop")
         if any(tick % self.assembly.scenario.rates.steps for tick in self.suite.ticks):
             raise Untraceable("sensors sample between control instants")
-        with self.program.section() as nothing:
-            pass
-        held = (self._held(np.asarray(each, float)) for each in command)
+        if any(effect.waits for effect in self.effects):
+            raise Untraceable("a step effect waits for a signal")
+        before = after = tuple(self.sensors.values())
+        reports = []
+        with self.program.section() as sensing:
+            if sensors:
+                after, measurement = self._sample()
+                reports = self._reports(measurement)
+        prove(sensing[0], self.program.memory)
+        held = (self.held_of_one(np.asarray(each, float)) for each in example.command)
         return self._compiled(
-            _tuple_like(command, held),
-            sensing=nothing[0],
-            after_sensing=[],
-            recorded=[],
+            tuple_like(example.command, held),
+            sensing=Section(sensing[0], changes(before, after), np.zeros(0)),
+            recorded=reports,
             kinds={},
         )
 
     def _compiled(
-        self,
-        command: Any,
-        *,
-        sensing: Calls,
-        after_sensing: Copies,
-        recorded: list[Recorded],
-        kinds: dict[str, type],
+        self, command: Any, *, sensing: Section, recorded: list[Recorded], kinds: dict[str, type]
     ) -> PeriodProgram:
-        """Return the program that goes on with the actuators; ``recorded`` is of the law."""
+        """Return the program that goes on with the actuators; ``recorded`` is of what is before."""
         own = tuple(self.memory.values())
         with self.program.section() as driving:
-            truth, motors, inner = self._truth(), self._traced_tuple(command), self.law_state
+            truth, motors, inner = self._truth(), self.traced_tuple(command), self.law_state
             if self.assembly.inner:
-                held = self.suite.report(self._traced_arrays(self.sensors), truth)
+                held = self.suite.report(self.traced_arrays(self.sensors), truth)
                 inner, motors = self._law_inner(motors, held)
-                inner = self._next(self.law_state, inner)
+                inner = self.following(self.law_state, inner)
             memory, applied, saturated = self.assembly.actuators.act(
-                self._traced_arrays(self.memory), motors, truth, self.assembly.hold
+                self.traced_arrays(self.memory), motors, truth, self.assembly.hold
             )
-            outputs = self._numbers(applied)
-            (cut,) = self._numbers((saturated,))
-            remembered = self._next(own, tuple(memory[name] for name in self.memory))
+            instant = self._instant(truth, command)
+            for effect in self.effects:
+                memory, applied = effect.change(memory, applied, instant)
+            outputs = self.numbers(applied)
+            (cut,) = self.numbers((saturated,))
+            remembered = self.following(own, tuple(memory[name] for name in self.memory))
         prove(driving[0], self.program.memory)
+        remembers = dict(zip(self.memory, remembered, strict=True))
+        preparing, written, masses = self._preparing(remembers)
         before = [Recorded("physics", "", self.physics)]
         before += [Recorded("memory", name, array) for name, array in self.memory.items()]
-        before += [*recorded, *_recorded("command", command)]
+        before += recorded
         after = [Recorded("sensordata", "", self.sensordata)]
         after += [Recorded("applied", str(index), array) for index, array in enumerate(outputs)]
+        changed = changes(self.law_state, inner) + changes(own, remembered)
         return PeriodProgram(
             program=self.program,
+            looking=self._looking(),
             sensing=sensing,
-            driving=driving[0],
+            driving=Section(driving[0], changed, np.zeros(0)),
+            preparing=preparing,
             time=self.time,
             physics=self.physics,
             sensordata=self.sensordata,
@@ -181,113 +187,132 @@ class _Tracing:
             sensors=self.sensors,
             biases=self.biases,
             draws=self.draws,
+            known=self.known,
             command=command,
             has_law="law" in kinds,
-            after_sensing=after_sensing,
-            after_driving=_changes(self.law_state, inner) + _changes(own, remembered),
             applied=outputs,
             saturated=cut,
+            written=written,
+            masses=masses,
             before=before,
             after=after,
             kinds=kinds | {"command": type(command)},
         )
 
-    def _truth(self) -> Any:
-        physics: Any = self._traced(self.physics)
-        return truth_of(
-            physics, self._traced_arrays(self.memory), self.layout, self.assembly.actuators, ()
+    def _instant(self, truth: Any, command: Any) -> Instant:
+        """Return the instant as effects know it that change what the actuators apply."""
+        unknown: Any = None
+        return Instant(
+            time=self.traced(self.time),
+            physics=self.traced(self.physics),
+            truth=truth,
+            measurement=unknown,
+            command=command,
+            signals=unknown,
+            memory=self.traced_arrays(self.memory),
+            events=[],
         )
 
-    def _reports(self, measurement: Any) -> list[Recorded]:
-        """Return what is recorded of the ``measurement``; nothing where it follows from the truth.
+    def _alarms(self, measurement: Any, command: Any, signals: Any) -> np.ndarray:
+        """Return where step effects have an event to tell after the law's step."""
+        waiting = [effect for effect in self.effects if effect.waits]
+        if not waiting:
+            return np.zeros(0)
+        topics = {"truth": self._truth(), "measurement": measurement}
+        topics |= {"command": command, "law": signals}
+        memory = self.traced_arrays(self.memory)
+        return self._report([effect.alarm(memory, topics) for effect in waiting])
 
-        Of ideal sensors a block computes it for all of its periods at once.
+    def _looking(self) -> Section:
+        """Return what step effects see."""
+        own = tuple(self.memory.values())
+        with self.program.section() as looking:
+            memory, reports = self.traced_arrays(self.memory), []
+            for effect in self.effects:
+                if effect.looks:
+                    memory, report = effect.look(
+                        memory, self.traced(self.physics), self.traced(self.sensordata)
+                    )
+                    reports.append(report)
+            seen = self.following(own, tuple(memory[name] for name in self.memory))
+            told = self._report(reports)
+        prove(looking[0], self.program.memory)
+        return Section(looking[0], changes(own, seen), told)
+
+    def _preparing(
+        self, remembered: dict[str, np.ndarray]
+    ) -> tuple[Section, list[Write], list[Write]]:
+        """Return what step effects change for a step, after which ``remembered`` holds.
+
+        That is a section, what it writes into mjData, and into mjModel.
         """
-        if not self.suite.ticks:
-            return []
+        memory = self.traced_arrays(self.memory), self.traced_arrays(remembered)
+        with self.program.section() as preparing:
+            written, masses, reports = list[Write](), list[Write](), []
+            for effect, known in zip(self.effects, self.known, strict=True):
+                writes, report = effect.prepare(
+                    self.traced(self.physics), self.traced(self.time), self.traced(known)
+                )
+                written += self._own_numbers(writes)
+                reports.append(report)
+                of_bodies = effect.masses(*memory)
+                masses += self._own_numbers(
+                    Write(name, body * values.size, values) for name, body, values in of_bodies
+                )
+            told = self._report(reports)
+        prove(preparing[0], self.program.memory)
+        return Section(preparing[0], [], told), written, masses
+
+    def _own_numbers(self, writes: Iterable[Write]) -> list[Write]:
+        """Return the writes with arrays that nothing else changes."""
+        return [each._replace(values=self.numbers((each.values,))[0]) for each in writes]
+
+    def _report(self, reports: Iterable[Any]) -> np.ndarray:
+        """Return as one array where there is an event to tell."""
+        given = [report.astype(float).reshape(-1) for report in reports if report is not None]
+        return self.numbers((np.concatenate(given),))[0] if given else np.zeros(0)
+
+    def _truth(self) -> Any:
+        physics, memory = self.traced(self.physics), self.traced_arrays(self.memory)
+        return truth_of(physics, memory, self.layout, self.assembly.actuators, self.effects)
+
+    def _sample(self) -> tuple[Any, Any]:
+        """Return what the sensors remember after a sample, and the measurement."""
+        steps = self.assembly.scenario.rates.steps
+        if self.suite.ticks - {steps}:
+            raise Untraceable("sensors sample at other times than the control instants")
+        # Not of sample 0, which integrating sensors begin with.
+        sampled, measurement = self.suite.sample(
+            self.traced_arrays(self.sensors), steps, self._truth()
+        )
+        before = tuple(self.sensors.values())
+        return self.following(before, tuple(sampled[name] for name in self.sensors)), measurement
+
+    def _reports(self, measurement: Any) -> list[Recorded]:
+        """Return what is recorded of sensors: what they remembered, and the ``measurement``."""
         values = {name: value for name, value in measurement._asdict().items() if value.size}
-        arrays = self._numbers(tuple(values.values()))
+        arrays = self.numbers(tuple(values.values()))
         return [
-            Recorded("measurement", name, array) for name, array in zip(values, arrays, strict=True)
+            *(Recorded("sensors", name, array) for name, array in self.sensors.items()),
+            *(Recorded("measurement", n, a) for n, a in zip(values, arrays, strict=True)),
         ]
 
     def _law_step(self, measurement: Any) -> tuple[Any, Any, Any]:
         unbatched = isinstance(self.assembly.law, UnbatchedLaw)
         step = UnbatchedLaw(self.law).step_of_one if unbatched else self.law.step
-        state, reference = self._traced_tuple(self.law_state), self._traced_tuple(self.reference)
+        state, reference = self.traced_tuple(self.law_state), self.traced_tuple(self.reference)
         with _of_the_law():
-            after, command, signals = step(state, self._traced(self.time), measurement, reference)
+            after, command, signals = step(state, self.traced(self.time), measurement, reference)
         return after or (), command, signals or ()
 
     def _law_inner(self, command: Any, measurement: Any) -> tuple[Any, Any]:
-        state = self._traced_tuple(self.law_state)
+        state = self.traced_tuple(self.law_state)
         with _of_the_law():
-            after, motors = self.law.inner(state, self._traced(self.time), command, measurement)
+            after, motors = self.law.inner(state, self.traced(self.time), command, measurement)
         return after or (), motors
 
-    def _held(self, array: Any) -> np.ndarray:
-        """Return one vehicle's part of an ``array`` of the example, in the memory."""
-        array = np.asarray(array)
-        if array.dtype not in (np.dtype(float), np.dtype(bool)):
-            raise Untraceable(f"a state of {array.dtype}")
-        return self.program.copied(_elsewhere(array[:1]))
-
-    def _traced(self, array: np.ndarray) -> Any:
-        view = array.view()
-        view.setflags(write=False)
-        return TracedArray(view, self.program)
-
-    def _traced_tuple(self, arrays: Any) -> Any:
-        return _tuple_like(arrays, map(self._traced, arrays))
-
-    def _traced_arrays(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-        return {name: self._traced(array) for name, array in arrays.items()}
-
-    def _next(self, before: Any, after: Any) -> Any:
-        """Return the state that follows ``before``, in contiguous arrays that no input shares.
-
-        A field that stays as it is, is the array that it was.
-        """
-        arrays = [
-            value.array
-            if isinstance(value, TracedArray)
-            and (value.array.ctypes.data, value.array.strides) == (own.ctypes.data, own.strides)
-            else self._own(value)
-            for own, value in zip(before, after, strict=True)
-        ]
-        if [(a.shape, a.dtype) for a in arrays] != [(a.shape, a.dtype) for a in before]:
-            raise Untraceable("a state has other shapes or types after a step")
-        return _tuple_like(after, arrays)
-
-    def _own(self, value: Any) -> np.ndarray:
-        """Return a result in a contiguous array of the memory that no input shares."""
-        if not isinstance(value, TracedArray):
-            return self.program.copied(value)
-        shared = any(np.may_share_memory(value.array, each) for each in self.inputs)
-        if value.array.flags.c_contiguous and not shared:
-            return value.array
-        return value.copy().array
-
-    def _numbers(self, values: Any) -> Any:
-        """Return results, a tuple, as float64 in arrays that nothing else changes."""
-        return _tuple_like(
-            values,
-            (
-                self._own(value.astype(float))
-                if isinstance(value, TracedArray) and value.dtype != float
-                else self._own(value)
-                for value in values
-            ),
-        )
-
-
-def _elsewhere(values: Any) -> np.ndarray:
-    """Return values near those of the flight, and none of them.
-
-    If one of them is frozen in the program, the first period that it flies shows it.
-    """
-    array = np.asarray(values)
-    return ~array if array.dtype == bool else array * (1.0 + 1e-6) + 1e-9
+    def _held_arrays(self, arrays: dict[str, Any]) -> dict[str, np.ndarray]:
+        return {name: self.held_of_one(array) for name, array in arrays.items()}
 
 
 @contextmanager
@@ -295,7 +320,9 @@ def _of_the_law() -> Iterator[None]:
     """Name the line of the law that cannot be taken down, or that raised anything else."""
     try:
         yield
-    except Exception as error:
+    except Interrupted:
+        raise
+    except BaseException as error:
         raise Untraceable(f"{error} ({place_of(error)})") from error
 
 
@@ -303,14 +330,3 @@ def _recorded(group: str, arrays: Any) -> list[Recorded]:
     """Return the fields of a named tuple, which may be empty."""
     names = getattr(arrays, "_fields", ())
     return [Recorded(group, name, array) for name, array in zip(names, arrays, strict=True)]
-
-
-def _tuple_like(example: Any, values: Any) -> Any:
-    """Return the ``values`` as a named tuple like the ``example``, which may be empty."""
-    return type(example)(*values) if hasattr(example, "_fields") else tuple(values)
-
-
-def _changes(targets: Any, sources: Any) -> Copies:
-    """Return the copies that make ``targets`` what ``sources`` are."""
-    pairs = zip(targets, sources, strict=True)
-    return [(to, of) for to, of in pairs if to.ctypes.data != of.ctypes.data]

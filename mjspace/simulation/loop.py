@@ -10,6 +10,7 @@ from mujoco.batch import SimulationError
 
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError
+from mjspace.interrupts import Interrupted
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compiled_blocks import CompiledBlocks, stopped_at
 from mjspace.simulation.control_period import ControlPeriod
@@ -48,6 +49,7 @@ def fly(
 
     Raises:
         FlightError: the flight cannot go on; every good period has been yielded before.
+        Interrupted: a signal broke it off; likewise.
         InputError: an event of the scenario names no signal of this flight; nothing was yielded.
     """
     flight = _Flight(assembly, start, members, threads)
@@ -81,9 +83,12 @@ def what_is_compiled(assembly: Assembly) -> str:
         FlightError: it cannot be flown.
     """
     flight = _Flight(assembly, first_start(assembly, [0]), [0], threads=1)
-    _, _, trouble = flight.record(0, last_period(assembly.scenario), lambda: False)
-    if trouble is not None:
-        raise trouble
+    first, last = 0, last_period(assembly.scenario)
+    while first <= last and flight.compiled.is_to_be_seen:  # not where something happens
+        columns, _, trouble = flight.record(first, last, lambda: False)
+        if trouble is not None:
+            raise trouble
+        first += len(columns)
     return str(flight.compiled)
 
 
@@ -97,7 +102,9 @@ class _Flight:
         self._law = FlownLaw(assembly.law, start.law, len(members))
         inner = self._law.inner if assembly.inner else None
         self.stepper = Stepper(assembly, start, members, threads=threads, inner=inner)
-        self.compiled = CompiledBlocks(assembly, start, members, self.stepper, self._law, threads)
+        self.compiled = CompiledBlocks(
+            assembly, start, members, self.stepper, self._law, threads, BLOCK_PERIODS
+        )
         # Each period, with law, signals and measurement.
         recorded = 4 * self.stepper.batch.state.nbytes
         self._periods = max(1, min(BLOCK_PERIODS, BLOCK_BYTES // recorded))
@@ -105,10 +112,11 @@ class _Flight:
 
     def record(
         self, first: int, last: int, stop: Callable[[], bool]
-    ) -> tuple[Columns, DesiredMotion, FlightError | None]:
+    ) -> tuple[Columns, DesiredMotion, FlightError | Interrupted | None]:
         """Fly a block of periods; return what it recorded, what was desired, and what ended it.
 
-        Where the period can be compiled, its first is flown in Python, and proves the rest.
+        Where the period can be compiled, its first is flown in Python, and proves the rest; and the
+        blocks that follow, up to ``BLOCK_PERIODS`` periods of each vehicle.
 
         Raises:
             FlightError: nothing was recorded.
@@ -117,7 +125,10 @@ class _Flight:
         count = _in_a_block(min(self._periods, last - first + 1), self._seconds)
         times = np.arange(first, first + count, dtype=float) * self._control
         desired = reference_at(self._assembly.reference, times)
-        if not self.compiled.on:
+        proved = self.compiled.fly_on(first, count, last, desired)
+        if proved is not None:
+            columns, trouble = proved, None
+        elif not self.compiled.on:
             columns, _, trouble = self._fly_in_python(first, count, last, desired, stop)
         else:
             columns, period, trouble = self._fly_in_python(first, 1, last, desired, stop)
@@ -136,7 +147,7 @@ class _Flight:
         last: int,
         desired: DesiredMotion,
         stop: Callable[[], bool],
-    ) -> tuple[Columns, ControlPeriod, FlightError | None]:
+    ) -> tuple[Columns, ControlPeriod, FlightError | Interrupted | None]:
         """Return what ``count`` periods recorded, the last of them, and what ended them.
 
         Raises:
@@ -144,7 +155,8 @@ class _Flight:
         """
         recording: Recording | None = None
         due = clock.monotonic() + BLOCK_SECONDS
-        now, trouble = first * self._control, None
+        now = first * self._control
+        trouble: FlightError | Interrupted | None = None
         try:
             # A law's infinities are found in what it commands, not in NumPy's warnings.
             with np.errstate(all="ignore"):
@@ -164,6 +176,10 @@ class _Flight:
             trouble = stopped_at(now, error)
             if recording is None:
                 raise trouble from trouble.__cause__
+        except Interrupted as error:
+            if recording is None:
+                raise
+            trouble = error
         raised = np.flatnonzero(self.stepper.batch.warning[:, :, 1].any(axis=0))
         if trouble is None and len(raised):
             warning = mujoco.mjtWarning(int(raised[0])).name

@@ -1,9 +1,13 @@
 """The Earth's magnetic field along the orbit as a step effect: the piece that holds now."""
 
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from mjspace.environment.magnetic_field import FIELD
-from mjspace.vehicle.step_effect import Instant, State, StepEffect
+from mjspace.contract import Array
+from mjspace.environment.magnetic_field import FIELD, of_piece
+from mjspace.sensors.base import Surroundings
+from mjspace.vehicle.step_effect import Instant, State, StepEffect, Write
 
 if TYPE_CHECKING:
     from mjspace.environment.geomagnetism import FieldAlongOrbit
@@ -13,6 +17,7 @@ class MagneticField(StepEffect):
     """Hands the field's cubic of time to the environment, which turns moments in it."""
 
     name: ClassVar[str] = "the magnetic field"
+    not_compiled = ""
 
     @classmethod
     def of(cls, field: "FieldAlongOrbit | None") -> Self | None:
@@ -32,3 +37,17 @@ class MagneticField(StepEffect):
         """Set the cubic that holds from this control instant on."""
         self._acting[:] = self._field.piece(instant.time)
         return memory
+
+    def known(self, times: Array) -> Array:
+        """Return the cubic of each control instant."""
+        return self._field.piece(times)
+
+    def prepare(
+        self, physics: Array, time: Array, known: Array
+    ) -> tuple[list[Write], Array | None]:
+        """Return that the cubic is written."""
+        return [Write("userdata", FIELD.start, known[None])], None
+
+    def around(self, surroundings: Surroundings, known: Array) -> Surroundings:
+        """Return surroundings with the field of that cubic."""
+        return replace(surroundings, magnetic_field=partial(of_piece, known))

@@ -8,7 +8,7 @@ import ctypes
 import functools
 import sys
 import weakref
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -68,9 +68,17 @@ class NativeBatch:
     """
 
     def __init__(
-        self, model: Any, vehicles: int, threads: int, fields: Mapping[str, Array]
+        self,
+        model: Any,
+        vehicles: int,
+        threads: int,
+        fields: Mapping[str, Array],
+        own: Collection[str] = (),
     ) -> None:
         """Make it; ``fields`` of the model differ between vehicles, (N, ...).
+
+        Each thread has its ``own`` copy of other fields, and of all that MuJoCo derives from them:
+        a function that is applied may change both, and finds the fields anew at each vehicle.
 
         Raises:
             ValueError: MuJoCo cannot make it.
@@ -87,15 +95,34 @@ class NativeBatch:
         self._memory = _Memory()
         weakref.finalize(self._memory, library().mjb_deleteBatch, self._batch)
         self.vehicles = vehicles
+        self._apply = library().mjb_apply  # called in every period of a law in Python
         size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
         rows = library().mjb_state(self._batch)
         self.state = self._array(rows, ctypes.c_double, (vehicles, size))
         counters = (vehicles, int(mujoco.mjtWarning.mjNWARNING), 2)
         self.warning = self._array(library().mjb_warning(self._batch), ctypes.c_int, counters)
+        for name in own:
+            library().mjb_expand(self._batch, name.encode(), None, None)
+        if own:
+            self._check(library().mjb_setConst(self._batch, None, 0))
+        self._fields: dict[str, Array] = {}
+        self.follow(fields)
+
+    def follow(self, fields: Mapping[str, Array]) -> None:
+        """Let those fields of the model be the vehicles' own, (N, ...), with all that derives.
+
+        Raises:
+            mujoco.batch.SimulationError: MuJoCo raised an error.
+        """
+        changed = False
         for name, values in fields.items():
-            at = library().mjb_expand(self._batch, name.encode(), None, None)
-            self._array(at, ctypes.c_double, values.shape)[...] = values
-        if fields:
+            if name not in self._fields:
+                at = library().mjb_expand(self._batch, name.encode(), None, None)
+                self._fields[name] = self._array(at, ctypes.c_double, values.shape)
+                changed = True
+            changed |= not np.array_equal(self._fields[name], values)
+            self._fields[name][...] = values
+        if changed:
             self._check(library().mjb_setConst(self._batch, None, 0))
 
     def apply(self, function: int, argument: int) -> None:
@@ -104,7 +131,9 @@ class NativeBatch:
         Raises:
             mujoco.batch.SimulationError: MuJoCo raised an error in some simulations.
         """
-        self._check(library().mjb_apply(self._batch, None, 0, function, argument, 1))
+        failed = self._apply(self._batch, None, 0, function, argument, 1)
+        if failed:
+            self._check(failed)
 
     def _check(self, failed: int) -> None:
         if failed:

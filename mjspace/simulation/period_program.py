@@ -1,4 +1,4 @@
-"""A control period as a program: law, inner loop and actuators, or actuators alone."""
+"""A control period as a program: step effects, law, inner loop and actuators, or without a law."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mjspace.tracing.program import Calls, Program
+from mjspace.vehicle.step_effect import Write
 
 Copies = list[tuple[np.ndarray, np.ndarray]]
 """Pairs (to, from) of arrays of a program's memory."""
@@ -19,15 +20,29 @@ class Recorded(NamedTuple):
     array: np.ndarray
 
 
+class Section(NamedTuple):
+    """A part of the program that is called by itself."""
+
+    calls: Calls
+    after: Copies
+    """Made within the memory after it."""
+    report: np.ndarray
+    """Other than 0.0 where a step effect has an event to tell, (reports,)."""
+
+
 @dataclass(frozen=True)
 class PeriodProgram:
     """The program of one vehicle's control period; all arrays are views of its memory."""
 
     program: Program
-    sensing: Calls
-    """Of a control instant: the law."""
-    driving: Calls
+    looking: Section
+    """Of a control instant and of the end of each later step: what step effects see."""
+    sensing: Section
+    """Of a control instant: sensors and law."""
+    driving: Section
     """Of an integration step: inner loop and actuators."""
+    preparing: Section
+    """Of an integration step: what step effects change for it."""
     time: np.ndarray
     """[s], shape ()."""
     physics: np.ndarray
@@ -37,7 +52,7 @@ class PeriodProgram:
     reference: Any
     """The desired motion, a named tuple of arrays without a vehicle axis."""
     memory: dict[str, np.ndarray]
-    """What the actuators remember, (1, ...)."""
+    """What actuators and step effects remember, (1, ...)."""
     law: Any
     """The law's state, a named tuple of arrays (1, ...), or empty."""
     sensors: dict[str, np.ndarray]
@@ -46,16 +61,20 @@ class PeriodProgram:
     """The constant bias of each sensor that is not ideal, (1, axes)."""
     draws: dict[str, np.ndarray]
     """Random numbers of a sample, (1, axes), as ``SensorSuite.draws`` names them."""
+    known: tuple[np.ndarray, ...]
+    """What each step effect knows of a control instant beforehand, (k,)."""
     command: Any
     """The law's command, a named tuple of arrays (1, ...)."""
     has_law: bool
     """Whether the program makes the command; else it is made elsewhere, as its input."""
-    after_sensing: Copies
-    after_driving: Copies
     applied: tuple[np.ndarray, ...]
     """What each kind of actuator applies, (1, width)."""
     saturated: np.ndarray
     """1.0 for each motor that saturates, (1, motors)."""
+    written: list[Write]
+    """By step effects, into mjData."""
+    masses: list[Write]
+    """Into mjModel."""
     before: list[Recorded]
     """Recorded at the control instant."""
     after: list[Recorded]

@@ -13,7 +13,7 @@ from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
-from mjspace.vehicle.step_effect import StepEffect
+from mjspace.vehicle.step_effect import State, StepEffect
 
 Rows = dict[str, dict[str, Array]]
 
@@ -57,7 +57,12 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
     }
     first, culprit = len(block.time), ""
     for name, values in acting.items():
-        # Also false for what is not a number.
+        # Each is also false for what is not a number; the first is quicker.
+        if (
+            values.max(initial=0.0) <= mujoco.mjMAXVAL
+            and values.min(initial=0.0) >= -mujoco.mjMAXVAL
+        ):
+            continue
         good = (np.abs(values) <= mujoco.mjMAXVAL).reshape(len(values), -1).all(axis=1)
         if not good.all() and int(np.argmin(good)) < first:
             first, culprit = int(np.argmin(good)), name
@@ -69,10 +74,11 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
     return replace(block, time=block.time[:first], rows=rows, events=events), problem
 
 
-OF_THE_LAW = ("sensors", "measurement", "law", "signals")
-"""What sensors and law leave in a ``ControlPeriod``."""
+OF_SENSORS = ("sensors", "measurement")
+"""What sensors leave in a ``ControlPeriod``."""
 EVERYTHING = (
-    *OF_THE_LAW,
+    *OF_SENSORS,
+    *("law", "signals"),
     *("physics", "memory", "command", "applied", "saturated", "wrench", "sensordata"),
 )
 _AS_FLOATS = ("law", "command", "signals")
@@ -142,10 +148,17 @@ class Recording:
         self._events += period.events
         self._rows += 1
 
-    def columns(self) -> Columns:
-        """Return what has been recorded, as views."""
+    def sensors_before(self, number: int, now: State) -> State:
+        """Return what the sensors remembered before that period; ``now`` if it is not recorded."""
+        if number >= self._rows:
+            return now
+        return {name: column[number].copy() for name, column in self._columns["sensors"].items()}
+
+    def columns(self, count: int | None = None) -> Columns:
+        """Return what has been recorded, of the first ``count`` periods or of all, as views."""
+        rows = self._rows if count is None else count
         groups = {
-            name: {label: column[: self._rows] for label, column in columns.items()}
+            name: {label: column[:rows] for label, column in columns.items()}
             for name, columns in self._columns.items()
         }
         return Columns(groups, self._events, self._kinds)

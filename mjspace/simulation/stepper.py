@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from mjspace import attitude
+from mjspace import attitude, interrupts
 from mjspace.contract import Array, Measurement
 from mjspace.environment.install import install_callbacks
 from mjspace.errors import FlightError, InputError, failure
+from mjspace.interrupts import Interrupted
 from mjspace.simulation import mujoco_warnings
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
@@ -19,12 +20,14 @@ from mjspace.simulation.initial_state import Start
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.user_code import sealed
-from mjspace.vehicle.step_effect import Instant, StepEffect
+from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 InnerLoop = Callable[[float, Any, Measurement], Any]
 """Returns the motors' command of an integration step from (time [s], the law's command,
 measurement)."""
 
+STEPS_AT_ONCE = 1000
+"""Integration steps without a look at signals."""
 _LOCATED = (FlightError, InputError, SimulationError)
 """Errors that say themselves whose they are."""
 
@@ -94,6 +97,14 @@ class Stepper:
         period.measurement = self._measure(number * self._steps, period.truth)
         return period
 
+    def observed(self, number: int) -> State:
+        """Return what is remembered once the effects have observed the control instant of now."""
+        before = self.memory
+        if self._hooks["observe"]:
+            self._each_effect("observe", self._copy_of_state(), number * self._control, [])
+        observed, self.memory = self.memory, before
+        return observed
+
     def check(self, command: Any) -> None:
         """Refuse a law's ``command`` that the actuators cannot obey.
 
@@ -145,6 +156,7 @@ class Stepper:
 
         Raises:
             FlightError, mujoco.batch.SimulationError: as ``begin``.
+            Interrupted: a signal was received within a long period.
         """
         step = 1
         while step < self._steps:
@@ -162,8 +174,15 @@ class Stepper:
                 step += 1
             else:
                 count = self._tick - step % self._tick
-                self.batch.step(nstep=count)
+                self._step(count)
                 step += count
+
+    def _step(self, count: int) -> None:
+        """Fly so many integration steps, unless a signal is received."""
+        for done in range(0, count, STEPS_AT_ONCE):
+            if interrupts.received[0]:
+                raise Interrupted(interrupts.received[0])
+            self.batch.step(nstep=min(STEPS_AT_ONCE, count - done))
 
     def _between(self, period: ControlPeriod, step: int, *, due: bool) -> Instant:
         """Return the instant between control instants at which that step of the period begins."""
@@ -235,5 +254,5 @@ def _of(effect: StepEffect, method: Callable[..., Any], *arguments: Any) -> Any:
         return method(*arguments)
     except _LOCATED:
         raise
-    except Exception as error:
+    except BaseException as error:
         raise failure(effect.name, error) from error

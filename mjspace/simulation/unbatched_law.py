@@ -31,11 +31,12 @@ class UnbatchedLaw:
         self, state: Any, time: float, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
         """Return the law's state, command and signals with a vehicle axis."""
-        flown = [
-            self._step(v, state, time, measurement, reference) for v in range(len(measurement.rate))
-        ]
-        after, commands, signals = zip(*flown, strict=True)
-        return _stack("state", after), _stack("command", commands), _stack("signals", signals)
+        return stacked(
+            [
+                self._step(v, state, time, measurement, reference)
+                for v in range(len(measurement.rate))
+            ]
+        )
 
     def step_of_one(
         self, state: Any, time: Any, measurement: Measurement, reference: DesiredMotion
@@ -53,6 +54,16 @@ class UnbatchedLaw:
         returned = self.law.step(own, time, _of_vehicle(measurement, vehicle), reference)
         check_step(returned)
         return returned
+
+
+def stacked(returned: Sequence[tuple[Any, Any, Any]]) -> tuple[Any, Any, Any]:
+    """Return the (state, command, signals) of vehicles as those of all, a vehicle axis first.
+
+    Raises:
+        ReturnError: as ``_stack``.
+    """
+    state, command, signals = zip(*returned, strict=True)
+    return _stack("state", state), _stack("command", command), _stack("signals", signals)
 
 
 def _of_vehicle(measurement: Measurement, vehicle: int) -> Measurement:

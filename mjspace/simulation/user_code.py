@@ -49,7 +49,7 @@ def reference_at(source: ReferenceSource, time: Array) -> DesiredMotion:
     """
     try:
         returned = source.at(time)
-    except Exception as error:
+    except BaseException as error:
         raise failure("the reference", error) from error
     fields = getattr(returned, "_fields", ())
     if fields[: len(Reference._fields)] != Reference._fields:

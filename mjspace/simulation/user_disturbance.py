@@ -42,7 +42,7 @@ class UserDisturbance(StepEffect):
     def _of_one(self, now: float, truth: Truth) -> Array:
         try:
             returned = self._disturbance(now, truth)
-        except Exception as error:
+        except BaseException as error:
             raise failure("the disturbance", error) from error
         try:
             force, torque = (np.asarray(part, dtype=float) for part in returned)

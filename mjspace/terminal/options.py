@@ -15,8 +15,16 @@ Out = Annotated[
     Path | None,
     typer.Option("--out", help="Folder to write; runs/<scenario>/<UTC stamp> when left out."),
 ]
+Force = Annotated[bool, typer.Option("--force", help="Replace a log that is there already.")]
 Plot = Annotated[bool, typer.Option("--plot", help="Also plot the log: flight.png.")]
 Traceback = Annotated[
     bool, typer.Option("--traceback", help="Show what your own code raised in full.")
+]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust",
+        help="Let it run code out of the log, from any installed module or another folder.",
+    ),
 ]
 Video = Annotated[bool, typer.Option("--video", help="Also render the log: flight.mp4.")]

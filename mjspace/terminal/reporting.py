@@ -2,9 +2,11 @@
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from mjspace.errors import shortened
 
 if TYPE_CHECKING:
     from mjspace.log.reader import Log
@@ -27,15 +29,23 @@ def progress_bar(
 ) -> Iterator[Callable[[float], None]]:
     """Yield a function to call with the progress so far, of ``total``.
 
-    A bar is drawn after two seconds, where the output is a terminal.
+    A bar is drawn after two seconds, where the output is a terminal. A terminal that is closed
+    draws none, and stops nothing.
     """
     from tqdm import tqdm
 
     layout = "{desc} {percentage:3.0f}% |{bar}| " + count + "[{elapsed}<{remaining}]"
-    with tqdm(
-        total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout
-    ) as bar:
-        yield lambda reached: bar.update(reached - bar.n) and None
+    bar = tqdm(total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout)
+
+    def update(reached: float) -> None:
+        with suppress(OSError):
+            bar.update(reached - bar.n)
+
+    try:
+        yield update
+    finally:
+        with suppress(OSError):
+            bar.close()
 
 
 @contextmanager
@@ -67,7 +77,7 @@ def report_errors() -> Iterator[None]:
         status = _status(error)
         if status is None:
             raise
-        print(f"mjspace: {error}", file=sys.stderr)
+        print(f"mjspace: {shortened(str(error), 1500)}", file=sys.stderr)
         sys.exit(status)
 
 

@@ -24,11 +24,12 @@ def write(results: Results, folder: Path) -> tuple[Path, Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     data, page = folder / JSON, folder / HTML
-    data.write_text(results.model_dump_json() + "\n")
+    data.write_text(results.model_dump_json() + "\n", encoding="utf-8")
     page.write_text(
         _rendered(
             "report.html.j2", results=results, figures={} if results.quick else _drawn(results)
-        )
+        ),
+        encoding="utf-8",
     )
     return data, page
 
@@ -41,8 +42,8 @@ def write_passport(passport: Passport, folder: Path) -> tuple[Path, Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     data, page = folder / "passport.json", folder / "passport.html"
-    data.write_text(passport.model_dump_json(indent=2) + "\n")
-    page.write_text(_rendered("passport.html.j2", passport=passport))
+    data.write_text(passport.model_dump_json(indent=2) + "\n", encoding="utf-8")
+    page.write_text(_rendered("passport.html.j2", passport=passport), encoding="utf-8")
     return data, page
 
 
@@ -55,8 +56,10 @@ def write_markdown(results: Results, page: Path) -> None:
     folder = page.with_suffix("")
     folder.mkdir(parents=True, exist_ok=True)
     for name, drawing in _drawn(results).items():
-        (folder / f"{name}.svg").write_text(drawing)
-    page.write_text(_rendered("report.md.j2", results=results, figures=folder.name))
+        (folder / f"{name}.svg").write_text(drawing, encoding="utf-8")
+    page.write_text(
+        _rendered("report.md.j2", results=results, figures=folder.name), encoding="utf-8"
+    )
 
 
 def _drawn(results: Results) -> dict[str, str]:

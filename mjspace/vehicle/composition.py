@@ -50,15 +50,15 @@ def compose(table: PlantTable) -> Any:
 def part_names() -> list[str]:
     """Return the names of the parts to bolt to a bus: those with something that moves."""
     found = {path.parent.name: path for path in ASSETS.glob("parts/*/*.xml")}
-    return sorted(name for name, path in found.items() if "<joint " in path.read_text())
+    texts = {name: path.read_text(encoding="utf-8") for name, path in found.items()}
+    return sorted(name for name, text in texts.items() if "<joint " in text)
 
 
 def _load(name: str) -> Any:
-    scene = ASSETS / name / "scene.xml"
-    if not scene.is_file():
-        known = ", ".join(sorted(path.parent.name for path in ASSETS.glob("*/scene.xml")))
-        raise ValueError(f"plant.model: no model {name!r}: have {known}")
-    return mujoco.MjSpec.from_file(str(scene))
+    known = {path.parent.name: path for path in sorted(ASSETS.glob("*/scene.xml"))}
+    if name not in known:
+        raise ValueError(f"plant.model: no model {name!r}: have {', '.join(known)}")
+    return mujoco.MjSpec.from_file(str(known[name]))
 
 
 def _attach_part(spec: Any, name: str, part: Part) -> None:

@@ -28,14 +28,11 @@ class Ground(Table):
         Raises:
             ValueError: no such part.
         """
-        file = ASSETS / f"parts/{self.part}/{self.part}.xml"
-        if not file.is_file():
-            known = ", ".join(
-                sorted(path.parent.name for path in ASSETS.glob("parts/moon_*/*.xml"))
-            )
-            raise ValueError(f"plant.ground.part: no part {self.part!r}: have {known}")
+        known = {path.parent.name: path for path in sorted(ASSETS.glob("parts/moon_*/*.xml"))}
+        if self.part not in known:
+            raise ValueError(f"plant.ground.part: no part {self.part!r}: have {', '.join(known)}")
         across = [-np.sin(self.downhill), np.cos(self.downhill), 0.0]
         frame = spec.worldbody.add_frame()
         mujoco.mju_axisAngle2Quat(frame.quat, np.array(across), self.slope)
-        spec.attach(mujoco.MjSpec.from_file(str(file)), prefix="site_", frame=frame)
+        spec.attach(mujoco.MjSpec.from_file(str(known[self.part])), prefix="site_", frame=frame)
         ground_contact.add_sensors(spec, "site_ground")

@@ -54,6 +54,8 @@ class GroundContact(StepEffect):
 
     name: ClassVar[str] = "the ground contact"
     every_step: ClassVar[bool] = True
+    not_compiled = ""
+    looks: ClassVar[bool] = True
 
     feet: Any
     """Of each foot, the index of its number of contacts in ``sensordata``, shape (f,)."""
@@ -111,39 +113,49 @@ class GroundContact(StepEffect):
 
         ``physics`` (N, nstate) are the rows of ``now``, which the sensors describe as well.
         """
-        sensordata = self._sensordata
+        after, report = self.look(state, physics, self._sensordata)
+        if report.any():
+            events += self._told(state, after, physics, now)
+        return after
+
+    def look(self, memory: State, physics: Array, sensordata: Array) -> tuple[State, Array]:
+        """Return the memory with what touches now, and where that is a touchdown or a crash."""
         foot: Any = sensordata[:, self.feet] > 0.0
         hull: Any = (sensordata[:, self.hull] > 0.0).any(axis=1, keepdims=True)
         crushed: Any = physics[:, self.struts] > self.stroke
-        touches = hull | foot.any(axis=1, keepdims=True)
-        crashes = hull | crushed.any(axis=1, keepdims=True)
-        touched, crashed = state["ground_touched"] > 0.0, state["ground_crashed"] > 0.0
-        down, broken = touches & ~touched, crashes & ~crashed
+        touched_before, crashed_before = (
+            memory[name] > 0.0 for name in ("ground_touched", "ground_crashed")
+        )
+        touched = touched_before | hull | foot.any(axis=1, keepdims=True)
+        crashed = crashed_before | hull | crushed.any(axis=1, keepdims=True)
         velocity = physics[:, self.velocity]
-        after = state | {
+        after = memory | {
             "ground_foot": foot.astype(float),
             "ground_hull": hull.astype(float),
-            "ground_touched": (touched | touches).astype(float),
-            "ground_crashed": (crashed | crashes).astype(float),
-            "touchdown_velocity": np.where(
-                touched | touches, state["touchdown_velocity"], velocity
-            ),
-            "crash_velocity": np.where(crashed | crashes, state["crash_velocity"], velocity),
+            "ground_touched": touched.astype(float),
+            "ground_crashed": crashed.astype(float),
+            "touchdown_velocity": np.where(touched, memory["touchdown_velocity"], velocity),
+            "crash_velocity": np.where(crashed, memory["crash_velocity"], velocity),
         }
-        for vehicle in np.flatnonzero(down[:, 0]):
-            parts = [self.names[i] for i in np.flatnonzero(foot[vehicle])]
-            parts += ["hull"] if hull[vehicle, 0] else []
+        return after, (touched & ~touched_before) | (crashed & ~crashed_before)
+
+    def _told(self, before: State, after: State, physics: Array, now: float) -> list[Event]:
+        """Return the touchdowns and crashes that are new ``after`` and not in ``before``."""
+        events = []
+        for vehicle in np.flatnonzero(after["ground_touched"] > before["ground_touched"]):
+            parts = [self.names[i] for i in np.flatnonzero(after["ground_foot"][vehicle])]
+            parts += ["hull"] if after["ground_hull"][vehicle, 0] else []
             speed = _described(after["touchdown_velocity"][vehicle])
             text = f"first contact with the ground: {', '.join(parts)}, at {speed}"
             events.append(Event(now, int(vehicle), "INFO", text))
-        for vehicle in np.flatnonzero(broken[:, 0]):
+        for vehicle in np.flatnonzero(after["ground_crashed"] > before["ground_crashed"]):
             text = "the hull hits the ground"
-            if not hull[vehicle, 0]:
-                i = int(np.argmax(crushed[vehicle]))
+            if not after["ground_hull"][vehicle, 0]:
+                i = int(np.argmax(physics[vehicle, self.struts] > self.stroke))
                 text = f"{self.names[i]} is pressed beyond its stroke of {self.stroke[i]:g} m"
             text = f"crash: {text}, at {_described(after['crash_velocity'][vehicle])}"
             events.append(Event(now, int(vehicle), "ERROR", text))
-        return after
+        return events
 
     def add_to_truth(self, memory: State, truth: Measurement) -> Measurement:
         """Return the truth with what touches the ground."""

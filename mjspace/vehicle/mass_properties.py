@@ -139,10 +139,9 @@ def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inert
         raise ValueError(
             f"plant.vehicle_mass: {whole:g} kg is less than the parts' {whole - left:.6g} kg"
         )
-    moment = np.sum([other.mass * other.ipos for other in others], axis=0)
-    centre = -moment / left
-    of_others = [tensor(o.inertia, o.iquat) + o.mass * _point(o.ipos) for o in others]
-    own = inertia - left * _point(centre) - np.sum(of_others, axis=0)
+    centre = -sum((other.mass * other.ipos for other in others), np.zeros(3)) / left
+    of_others = (tensor(o.inertia, o.iquat) + o.mass * _point(o.ipos) for o in others)
+    own = inertia - left * _point(centre) - sum(of_others, np.zeros((3, 3)))
     if np.linalg.eigvalsh(own)[0] <= 0.0:
         eigenvalues = np.array2string(np.linalg.eigvalsh(own), precision=4)
         raise ValueError(

@@ -1,12 +1,20 @@
 """Step effects: what acts on the vehicles in flight besides actuators and environment."""
 
+import math
 from abc import ABC
+from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from mjspace.contract import Array, Event, Measurement
 
 State = dict[str, Array]
 """Named arrays that are remembered from step to step, vehicle axis first."""
+
+
+Topics = Mapping[str, Any]
+"""Named tuples of arrays by the topic that they are logged in."""
 
 
 class Instant(NamedTuple):
@@ -36,6 +44,17 @@ class Instant(NamedTuple):
         return self.command is not None
 
 
+class Write(NamedTuple):
+    """Numbers for one of MuJoCo's arrays."""
+
+    array: str
+    """Its name."""
+    first: int
+    """How many numbers of a vehicle's stand before them."""
+    values: Array
+    """(N, k)."""
+
+
 class StepEffect(ABC):
     """Base of an effect on a batch of vehicles: override what it does, the rest does nothing.
 
@@ -45,6 +64,10 @@ class StepEffect(ABC):
 
     In a control period the order is: ``observe``; the sensors and the law; ``at_control``; then for
     each integration step the actuators, ``change``, ``before_step``, MuJoCo, ``after_step``.
+
+    Where an effect is compiled, its methods of array code (``look``, ``add_to_truth``, ``alarm``,
+    ``change``, ``prepare``, ``masses``) are taken down. They stand for all that it does in each
+    period but those that are ``due`` and those in which they report an event: Python flies these.
     """
 
     name: ClassVar[str]
@@ -53,6 +76,14 @@ class StepEffect(ABC):
     """Whether it acts in every integration step; else only in the first of a control period."""
     needs_truth: ClassVar[bool] = False
     """Whether it needs the whole truth in every integration step, and not turning alone."""
+    not_compiled: str = "it is called in Python"
+    """Why a flight with it is flown in Python; "" where it is compiled."""
+    looks: ClassVar[bool] = False
+    """Whether it has a ``look``, at each control instant and integration step."""
+    waits: bool = False
+    """Whether it has an ``alarm``, at each control instant."""
+    fields: ClassVar[tuple[str, ...]] = ()
+    """Of MuJoCo's model, those that it changes with an event."""
     wrench: Array | None = None
     """Force [N], inertial axes, and torque [N m], body axes, on the bus during the step that
     ``before_step`` has prepared, (N, 6). Those of all effects are added up, applied and logged in
@@ -97,6 +128,53 @@ class StepEffect(ABC):
         state the end of the step.
         """
         return memory
+
+    def look(self, memory: State, physics: Array, sensordata: Array) -> tuple[State, Array]:
+        """Return (memory, report) from the state ``physics`` (N, nstate) and its sensors (N, k).
+
+        Of a compiled effect. The report (N, 1) is True where there is an event to be told.
+        """
+        return memory, np.zeros((len(physics), 1), bool)
+
+    def alarm(self, memory: State, topics: Topics) -> Array:
+        """Return where there is an event to be told at a control instant, True or False (N, 1).
+
+        Of a compiled effect, after the law's step. ``topics`` has the named tuples "truth",
+        "measurement", "command" and "law".
+        """
+        return np.zeros((1, 1), bool)
+
+    def prepare(
+        self, physics: Array, time: Array, known: Array
+    ) -> tuple[list[Write], Array | None]:
+        """Return (what it writes into MuJoCo's data, report) for the step that begins at ``time``.
+
+        Of a compiled effect. The report is as that of ``look``, or None; ``known`` (k,) is of the
+        control instant before.
+        """
+        return [], None
+
+    def due(self, after: float) -> float:
+        """Return the first instant from ``after`` on at which it is sure to have an event [s].
+
+        Of a compiled effect; infinite where there is none.
+        """
+        return math.inf
+
+    def known(self, times: Array) -> Array:
+        """Return what is known beforehand of control instants at ``times`` (n,) [s], (n, k)."""
+        return np.zeros((len(times), 0))
+
+    def around(self, surroundings: Any, known: Array) -> Any:
+        """Return the ``sensors.base.Surroundings`` with what of them is ``known`` beforehand."""
+        return surroundings
+
+    def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
+        """Return masses and inertias for the step that leads from ``before`` to ``after``.
+
+        Of a compiled effect: the field of MuJoCo's model, its body, and the values (N, ...).
+        """
+        return []
 
     def logged(self, memory: State, sensordata: Array) -> dict[str, Array]:
         """Return fields of /truth that it adds to the log, (n, N, k), from rows of a flight."""

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from thruster_samples import FORCE, PERIOD, STEP, TRUTH, built, check_batch, fire, layout
 
 from mjspace.actuators.cold_gas import ColdGas, ColdGasThrusters
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, PulseCommand
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.errors import InputError
 from mjspace.runner.replay import verify
 from mjspace.runner.run import fly_to_log

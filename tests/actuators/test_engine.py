@@ -9,8 +9,8 @@ import pytest
 
 from mjspace.actuators.base import Context
 from mjspace.actuators.engine import Engine, GimballedEngine
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array, Measurement, ThrustCommand
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.plant import Initial, Rates
 

@@ -10,8 +10,8 @@ from pydantic import ValidationError
 from thruster_samples import FORCE, PERIOD, STEP, TRUTH, built, check_batch, layout
 
 from mjspace.actuators.thrusters import Rcs, Thrusters
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Array
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.scenario.plant import PlantTable, Rates
 from mjspace.vehicle.vehicle import build, on_model
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjspace.constants import STANDARD_GRAVITY
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.rendering.scene import Stage
 from mjspace.runner.replay import verify
 from mjspace.runner.run import run

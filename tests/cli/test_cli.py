@@ -156,8 +156,9 @@ def test_info_names_all_that_keeps_a_flight_in_python() -> None:
         r"and the law has an inner loop\n",
         mjspace("info", "dgvscmg-slow-loops", *SHORT, "--compiled").stdout,
     )
-    assert mjspace("info", "wheel-failure", "--compiled").stdout == (
-        "flown in Python: step effects are not compiled (the faults)\n"
+    noisy = "faults=[{motor='wheel_1',kind='noisy',value=0.01,at=1}]"
+    assert mjspace("info", "wheel-failure", "--set", noisy, "--compiled").stdout == (
+        "flown in Python: the faults: a noisy motor is called in Python\n"
     )
 
 

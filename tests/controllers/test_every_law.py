@@ -18,9 +18,9 @@ import pytest
 
 from mjspace import attitude as att
 from mjspace.contract import Array, Measurement, Reference, TorqueCommand
-from mjspace.scenario.construct import controllers
 from mjspace.scenario.files import scenario_names
 from mjspace.scenario.loading import load
+from mjspace.scenario.trust import controllers
 from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly

@@ -18,8 +18,8 @@ pytest.importorskip("dm_control")
 from dm_env import StepType, TimeStep, test_utils
 
 from mjspace import dm_env
-from mjspace.constants import STANDARD_GRAVITY
 from mjspace.contract import Measurement
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.errors import InputError
 from mjspace.scenario.files import scenario_names
 from mjspace.scenario.loading import load

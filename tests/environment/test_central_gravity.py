@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mjspace import attitude
-from mjspace.constants import GM, RADIUS
 from mjspace.contract import Array
+from mjspace.environment.constants import GM, RADIUS
 from mjspace.environment.gravity import CentralGravity
 from mjspace.environment.install import install_callbacks, userdata, userdata_size
 from mjspace.scenario.environment import Environment

@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from mjspace import attitude
-from mjspace.constants import GM
 from mjspace.contract import Array
 from mjspace.environment.base import MAGIC
+from mjspace.environment.constants import GM
 from mjspace.environment.disturbance_torque import DisturbanceTorque, Sine
 from mjspace.environment.install import install_callbacks, userdata, userdata_size
 from mjspace.environment.orbit import Orbit, orbit_position

@@ -8,9 +8,9 @@ import pytest
 from pydantic import ValidationError
 
 from mjspace import attitude
-from mjspace.constants import RADIUS
 from mjspace.contract import Array
 from mjspace.environment import kepler
+from mjspace.environment.constants import RADIUS
 from mjspace.environment.dipole import EARTH_ROTATION
 from mjspace.environment.facet_drag import ATMOSPHERE, Facet, FacetDrag
 from mjspace.environment.install import install_callbacks, userdata, userdata_size

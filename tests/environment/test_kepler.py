@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mjspace.constants import GM
+from mjspace.environment.constants import GM
 from mjspace.environment.kepler import eccentric_anomaly
 from mjspace.environment.orbit import Orbit, orbit_position
 

@@ -51,6 +51,19 @@ def test_a_shifted_data_field_is_named(field: str) -> None:
         struct_offsets.verify(data, wrong, _SIZE)
 
 
+def test_the_most_constraints_are_where_they_are_said_to_be(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    data = mujoco.MjData(mujoco.MjModel.from_xml_string(_OTHER_MODEL))
+    data.maxuse_efc = 71
+    place = data._address + struct_offsets.most_constraints()
+    assert ctypes.c_int.from_address(place).value == 71
+    wrong = type("Wrong", (ctypes.Structure,), {"_fields_": [("maxuse_efc", ctypes.c_int)]})
+    monkeypatch.setattr(struct_offsets, "layout", lambda name: wrong)
+    with pytest.raises(RuntimeError, match=r"maxuse_efc is not at byte 0: mujoco .* reinstall"):
+        struct_offsets.most_constraints.__wrapped__()
+
+
 @pytest.mark.parametrize("word", [-1, _SIZE // 8, 2**40])
 def test_nothing_is_read_outside_the_struct(word: int) -> None:
     _, data_at = struct_offsets.find()

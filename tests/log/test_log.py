@@ -184,8 +184,9 @@ def test_the_nearest_row_may_stand_before_a_chunk_that_begins_with_an_earlier_ev
 
 
 def test_times_are_refused_one_by_one_and_a_window_may_be_open(tmp_path: Path) -> None:
-    for time in ([0.0, -1e-3], [0.002, 0.002], [0.0, 0.002, 0.001], [0.0, np.nan]):
-        with create(tmp_path / "refused.mcap") as log:
+    refused = ([0.0, -1e-3], [0.002, 0.002], [0.0, 0.002, 0.001], [0.0, np.nan])
+    for number, time in enumerate(refused):
+        with create(tmp_path / f"refused_{number}.mcap") as log:
             _, values = rows(0, len(time))
             with pytest.raises(ValueError, match=r"do not increase|starts at zero"):
                 log.write(np.array(time), values)

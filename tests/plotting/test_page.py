@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from full_disk import room_for
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -262,6 +263,12 @@ def test_a_log_cut_short_is_drawn_as_far_as_it_goes(pictured_log: Path, tmp_path
     page = figure(Log(cut))
     assert "Attitude error [deg]" in titles(page)
     assert any("cut short" in text.get_text() for text in page.texts)
+
+
+def test_a_full_disk_is_named_and_leaves_no_picture(pictured_log: Path, tmp_path: Path) -> None:
+    with room_for(3000), pytest.raises(OSError, match=r"File too large: '.*x\.png'"):
+        plot(pictured_log, tmp_path / "x.png")
+    assert not (tmp_path / "x.png").exists()
 
 
 def test_bad_input_is_refused(pictured_log: Path, tmp_path: Path) -> None:

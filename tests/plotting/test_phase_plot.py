@@ -5,6 +5,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from full_disk import room_for
 from matplotlib.colors import to_hex, to_rgb
 from PIL import Image
 
@@ -65,6 +66,12 @@ def test_the_file_is_a_picture(flown: Path, tmp_path: Path) -> None:
         near = image[779 - int(y) - 2 : 779 - int(y) + 3, int(x) - 2 : int(x) + 3].reshape(-1, 3)
         color = 255 * np.array(to_rgb(line.get_color()))
         assert np.abs(near - color).max(axis=1).min() < 12, label  # smoothed at the edge
+
+
+def test_a_full_disk_is_named_and_leaves_no_picture(flown: Path, tmp_path: Path) -> None:
+    with room_for(3000), pytest.raises(OSError, match=r"File too large: '.*x\.png'"):
+        plot(Log(flown), tmp_path / "x.png", "truth.rate[0]", "truth.rate[1]")
+    assert not (tmp_path / "x.png").exists()
 
 
 def test_bad_input_is_refused(flown: Path, tmp_path: Path) -> None:

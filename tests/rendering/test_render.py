@@ -11,6 +11,7 @@ import av
 import mujoco
 import numpy as np
 import pytest
+from full_disk import room_for
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -237,14 +238,28 @@ def test_a_video_has_every_frame(pictured_log: Path, tmp_path: Path) -> None:
         assert float(answer.stdout) == pytest.approx(2.1, abs=1e-3)
 
 
+@pytest.mark.parametrize("name", ["x.png", "x.mp4"])
+def test_a_full_disk_is_named_and_leaves_no_picture(
+    pictured_log: Path, tmp_path: Path, name: str
+) -> None:
+    path = tmp_path / name
+    with room_for(3000), pytest.raises(OSError, match=rf"File too large: '.*{name}'"):
+        render(pictured_log, path, size=(320, 180), rate=10.0)
+    assert not path.exists()
+
+
 @pytest.mark.parametrize(
     ("output", "wrong", "said"),
     [
         ("x.avi", {}, r"\.mp4 for a video, \.png"),
         ("x.mp4", {"size": (321, 180)}, "even, as in 322x180"),
-        ("x.png", {"size": (0, 180)}, "at least 16x16"),
+        ("x.png", {"size": (0, 180)}, "from 16x16 to 8192x8192"),
         ("x.mp4", {"rate": 0.0}, "positive"),
         ("x.mp4", {"speed": -1.0}, "positive"),
+        ("x.mp4", {"rate": np.nan}, "positive"),
+        ("x.mp4", {"rate": 1e9}, r"1e\+09 frames, should be at most 1000000"),
+        ("x.mp4", {"speed": 1e-9}, "frames, should be at most"),
+        ("x.png", {"size": (20000, 20000)}, "to 8192x8192"),
         ("x.png", {"at": 1.5}, "the log has 0 s to 1 s"),
         ("x.png", {"camera": "nose"}, "no camera 'nose': have chase, close, wide"),
     ],

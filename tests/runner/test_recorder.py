@@ -1,7 +1,7 @@
 """The log of a flight against what flew: every topic against its own source, and their units."""
 
+import errno
 import gzip
-import resource
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from full_disk import room_for
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -223,21 +224,21 @@ def test_a_disk_that_fills_up_ends_the_flight_and_what_fitted_is_kept(
     assert summary is not None
     fourth = summary.chunk_indexes[3].chunk_start_offset
     room = fourth + 100 if periods == 24 else whole.stat().st_size - 1
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
-    try:
-        with pytest.raises(OSError, match="File too large"):
-            run("detumble-wheels", overrides=SHORT, out=tmp_path / "full")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with room_for(room), pytest.raises(OSError, match=r"File too large: '.*flight\.mcap'"):
+        run("detumble-wheels", overrides=SHORT, out=tmp_path / "full")
     log = Log(tmp_path / "full/flight.mcap")
     assert (log.complete, len(log)) == (False, periods)
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("log")]
 
 
-def test_a_log_that_cannot_be_begun_ends_the_flight(tmp_path: Path) -> None:
-    (tmp_path / "flight.mcap").mkdir()
-    with pytest.raises(IsADirectoryError):
+def test_a_log_that_cannot_be_begun_ends_the_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr("mjspace.log.file.create", full)
+    with pytest.raises(OSError, match=r"No space left on device: .*flight\.mcap"):
         run("detumble-wheels", overrides=SHORT, out=tmp_path)
 
 

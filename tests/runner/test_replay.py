@@ -346,13 +346,14 @@ def test_another_law_from_the_middle(noisy: Result, tmp_path: Path) -> None:
     np.testing.assert_allclose(torque[0], -3.0 * seen[0], rtol=1e-14)
     # That log flies again by itself: the law is in it, and its state is too.
     (tmp_path / "damper.py").unlink()
-    assert verify(result.path, start=0.2) is None
-    assert verify(result.path, start=0.3) is None
+    assert verify(result.path, start=0.2, trust=True) is None
+    assert verify(result.path, start=0.3, trust=True) is None
 
 
 def test_what_cannot_be_replayed_is_refused(noisy: Result, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"t = 3 s is not in the log: it has 0 to 0\.4 s"):
-        verify(noisy.path, start=3.0)
+    for time in (3.0, -1.0, np.nan, np.inf, -np.inf):
+        with pytest.raises(InputError, match=rf"t = {time:g} s is not in the log: it has 0 to 0"):
+            verify(noisy.path, start=time)
     nonsense = tmp_path / "x.mcap"
     nonsense.write_bytes(b"hello")
     with pytest.raises(InputError, match=r"x\.mcap is not an MCAP file"):
@@ -394,16 +395,6 @@ def test_a_log_whose_state_is_laid_out_otherwise_is_refused(noisy: Result, tmp_p
     path = rewritten(noisy.path, tmp_path / "other.mcap", attachments={"scenario.toml": other})
     with pytest.raises(InputError, match="another version of mjspace laid its state out"):
         verify(path)
-
-
-def test_an_attachment_stays_in_its_folder(noisy: Result, tmp_path: Path) -> None:
-    """What is nobody's own code is not written at all."""
-    within = dict.fromkeys(("law/beside.py", "law/further/down/there.py", "../note.txt"), b"")
-    inside = rewritten(noisy.path, tmp_path / "in.mcap", attachments=within)
-    assert verify(inside) is None
-    outside = rewritten(noisy.path, tmp_path / "out.mcap", attachments={"law/../../up.py": b""})
-    with pytest.raises(InputError, match=r"the attachment 'law/\.\./\.\./up\.py' leads out"):
-        verify(outside)
 
 
 def test_under_another_law_what_looks_at_the_law_is_left_out(noisy: Result, tmp_path: Path) -> None:

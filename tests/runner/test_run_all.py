@@ -48,7 +48,8 @@ def test_each_is_flown_as_alone_and_they_come_in_order(tmp_path: Path) -> None:
     names = ["pd-plus-modified", "pd-plus"]
     told: list[float] = []
     short = ["duration=0.05", 'checks=[{name="x", signal="truth.rate", below=9.0}]']
-    found = run_all.fly(names, short, tmp_path, told.append)
+    found, ended_by = run_all.fly(names, short, tmp_path, told.append)
+    assert ended_by == 0
     assert [one.name for one in found] == names
     assert all(one.verdict == "PASS" for one in found)
     assert told[-1] == pytest.approx(1.0)

@@ -115,7 +115,8 @@ def test_a_flight_that_ends_early_fails_whatever_its_checks(
     assert "no way on" in found["trouble"]
     assert found["passed"] is False
     assert status == 1
-    assert mjspace("run", scenario, "--out", tmp_path, monkeypatch=monkeypatch) == 1
+    again = ("run", scenario, "--out", tmp_path, "--force")
+    assert mjspace(*again, monkeypatch=monkeypatch) == 1
     assert "ended early" in capsys.readouterr().out
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from mjspace.contract import Measurement, Reference
-from mjspace.scenario.construct import construct, load_object
+from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component
+from mjspace.scenario.trust import Trust
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 
 FACTS = {
@@ -48,7 +49,8 @@ class Damper:
 
 def build(kind: str, folder: Path = Path(), **gains: Any) -> tuple[Any, Component]:
     component = Component(kind=kind, **gains)
-    return construct(component, load_object(kind, folder), FACTS, folder)
+    trust = Trust(folder)
+    return construct(component, trust.load(kind), FACTS, trust)
 
 
 def test_facts_fill_what_the_table_leaves_out_and_the_table_wins() -> None:

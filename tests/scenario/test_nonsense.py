@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from mjspace.ranges import Range
 from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component
+from mjspace.scenario.trust import Trust
 
 KINDS = dict(kinds())
 TABLES = tables()
@@ -38,7 +39,7 @@ def test_gains_take_what_is_declared_and_nothing_else(name: str) -> None:
     kind, gains = KINDS[name], gains_of(name, KINDS[name])
 
     def build(**changed: Any) -> Any:
-        return construct(Component(kind=name, **gains | changed), kind, FACTS, Path())[0]
+        return construct(Component(kind=name, **gains | changed), kind, FACTS, Trust(Path()))[0]
 
     whole = build()
     for field in dataclasses.fields(kind):
@@ -66,7 +67,7 @@ def test_gains_take_what_is_declared_and_nothing_else(name: str) -> None:
 @pytest.mark.parametrize("name", KINDS)
 def test_a_law_that_is_constructed_directly_takes_no_nan(name: str) -> None:
     kind, gains = KINDS[name], gains_of(name, KINDS[name])
-    whole, _ = construct(Component(kind=name, **gains), kind, FACTS, Path())
+    whole, _ = construct(Component(kind=name, **gains), kind, FACTS, Trust(Path()))
     for field in dataclasses.fields(kind):
         if "unit" in field.metadata:
             spoiled = np.full(np.shape(getattr(whole, field.name)), np.nan)
@@ -84,7 +85,9 @@ def test_choices_and_switches_take_no_nonsense(name: str) -> None:
             continue
         for bad in NO_CHOICES:
             with pytest.raises(ValueError, match=field.name) as refused:
-                construct(Component(kind=name, **gains | {field.name: bad}), kind, FACTS, Path())
+                construct(
+                    Component(kind=name, **gains | {field.name: bad}), kind, FACTS, Trust(Path())
+                )
             assert "\n" not in str(refused.value)
 
 

@@ -11,7 +11,7 @@ from mjspace.contract import Measurement
 from mjspace.log.reader import Log
 from mjspace.runner.replay import assembly_of, replay, start_of, verify
 from mjspace.runner.run import run
-from mjspace.scenario.construct import load_object
+from mjspace.scenario.trust import Trust
 from mjspace.scenario.user_files import beside, load_file
 
 LAW = """
@@ -84,18 +84,20 @@ def test_a_log_of_a_law_of_several_files_is_flown_again_without_them(tmp_path: P
         types = {a.name: a.media_type for a in make_reader(stream).iter_attachments()}
     assert types["law/helpers.py"] == "text/x-python"
     assert types["law/gain.csv"] == "application/octet-stream"
-    assert verify(path) is None
-    with assembly_of(log) as built:  # not reset again where it has no state
+    assert verify(path, trust=True) is None
+    with assembly_of(log, trust=True) as built:  # not reset again where it has no state
         assert start_of(log, built, 0.05).law == ()
-    again = replay(path, tmp_path / "again").path  # whose log can be flown again as well
-    assert verify(again) is None
+    again = replay(
+        path, tmp_path / "again", trust=True
+    ).path  # whose log can be flown again as well
+    assert verify(again, trust=True) is None
 
 
 def test_two_folders_do_not_answer_for_one_another(tmp_path: Path) -> None:
     before = set(sys.modules), list(sys.path)
     for name, sign in (("a", -1.0), ("b", 1.0)):
         write(tmp_path / name, "+" if sign > 0.0 else "-")
-        damper = load_object("damper.py:Damper", tmp_path / name)
+        damper = Trust(tmp_path / name).load("damper.py:Damper")
         seen = Measurement(
             attitude=np.zeros(4), rate=np.array([0.1, 0.0, 0.0]), wheel_speed=np.zeros(3)
         )

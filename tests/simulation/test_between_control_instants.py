@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjspace.constants import STANDARD_GRAVITY
+from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.flown_law import FlownLaw

@@ -3,22 +3,19 @@
 import dataclasses
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
+from compiled_flights import assembly, assert_same, flown, one_of
 from mujoco.batch import SimulationError
 
-from mjspace.contract import Event
-from mjspace.errors import FlightError
-from mjspace.scenario.loading import load
-from mjspace.simulation import compiled_blocks, loop
-from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation import loop
+from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.initial_state import Start, first_start
-from mjspace.simulation.loop import fly
 from mjspace.simulation.stepper import Stepper
 from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
@@ -27,78 +24,10 @@ pytestmark = pytest.mark.filterwarnings(
 )
 
 
-class Flown(NamedTuple):
-    """A flight: rows by topic and field, events, what ended it, and what was compiled."""
-
-    rows: dict[str, np.ndarray]
-    events: list[Event]
-    trouble: str
-    compiled: str
-
-    def bits(self, vehicle: Any = slice(None)) -> dict[str, bytes]:
-        fields = {name: values for name, values in self.rows.items() if name != "time"}
-        return {name: values[:, vehicle].tobytes() for name, values in fields.items()}
-
-    @property
-    def told(self) -> list[Event]:
-        """The events in order of time, vehicle and text, as no block cuts them."""
-        return sorted(self.events)
-
-
 @pytest.fixture(autouse=True)
 def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(loop, "BLOCK_PERIODS", 40)
     monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
-
-
-def assembly(name: str, *overrides: str, folder: Path | None = None) -> Assembly:
-    scenario, beside = load(name, ["checks=[]", *overrides])
-    return assemble(scenario, folder or beside)
-
-
-def flown(
-    built: Assembly,
-    members: Sequence[int] = (0,),
-    *,
-    compiled: bool = True,
-    start: Start | None = None,
-    threads: int = 1,
-    stop: Callable[[], bool] = lambda: False,
-) -> Flown:
-    made: list[Any] = []
-    initialize = compiled_blocks.CompiledBlocks.__init__
-
-    def initialized(self: Any, *arguments: Any) -> None:
-        initialize(self, *arguments)
-        self.on = self.on and compiled
-        made.append(self)
-
-    blocks, trouble = [], ""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compiled_blocks.CompiledBlocks, "__init__", initialized)
-        try:
-            for block in fly(
-                built, start or first_start(built, members), members, threads=threads, stop=stop
-            ):
-                blocks.append(block)
-        except FlightError as error:
-            trouble = str(error)
-    rows = {
-        f"{topic}.{field}": np.concatenate([block.rows[topic][field] for block in blocks])
-        for topic, fields in blocks[0].rows.items()
-        for field in fields
-    }
-    rows["time"] = np.concatenate([block.time for block in blocks])[:, None]
-    return Flown(rows, [e for block in blocks for e in block.events], trouble, str(made[0]))
-
-
-def assert_same(one: Flown, other: Flown) -> None:
-    assert one.rows.keys() == other.rows.keys()
-    for name, values in one.rows.items():
-        assert values.shape == other.rows[name].shape, name
-        assert values.tobytes() == other.rows[name].tobytes(), name
-    assert one.told == other.told
-    assert one.trouble == other.trouble
 
 
 WHOLE = "compiled: sensors, law and actuators"
@@ -209,7 +138,7 @@ def test_vehicles_are_alike_alone_and_together_at_any_number_of_threads(name: st
         together = flown(built, members, start=start, threads=threads)
         assert together.compiled == WHOLE
         assert_same(together, python)
-    alone = flown(built, [2], start=_of(start, 2))
+    alone = flown(built, [2], start=one_of(start, 2))
     assert alone.bits(0) == python.bits(2)
     assert python.bits(1) != python.bits(2)
 
@@ -234,20 +163,6 @@ def test_sensors_with_errors_are_compiled_and_err_in_each_vehicle_by_itself() ->
         assert alone.compiled == WHOLE
         assert alone.bits(0) == python.bits(member)
     assert python.bits(1) != python.bits(2)
-
-
-def _of(start: Start, vehicle: int) -> Start:
-    """Return one vehicle's part of a start."""
-
-    def part(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        return {name: values[vehicle : vehicle + 1] for name, values in arrays.items()}
-
-    return dataclasses.replace(
-        start,
-        physics=start.physics[vehicle : vehicle + 1],
-        sensors=part(start.sensors),
-        actuators=part(start.actuators),
-    )
 
 
 @pytest.mark.parametrize("name", ["contraction-adaptive", "dgvscmg-tracking"])
@@ -357,9 +272,129 @@ def test_a_law_that_cannot_be_compiled_is_called_in_python(
 ) -> None:
     built = own_law(tmp_path, trouble)
     mixed, python = flown(built), flown(built, compiled=False)
-    assert mixed.compiled.startswith("actuators compiled; sensors and law called in Python: ")
+    assert mixed.compiled.startswith("sensors and actuators compiled; law called in Python: ")
     assert reason in mixed.compiled
     assert_same(mixed, python)
+
+
+@pytest.mark.parametrize(
+    "result",
+    [
+        "signals = Signals(signals.error, float(size))",  # a Python number
+        "torque = torque.tolist() if time > 0.05 else torque",
+        "torque = torque.astype(np.float32) if time > 0.05 else torque",
+        "slowed = float(slowed)",
+    ],
+)
+def test_what_a_called_law_returns_may_be_any_numbers(result: str, tmp_path: Path) -> None:
+    built = own_law(tmp_path)
+    source = HEAD.replace("{trouble}", "assert time >= 0.0")
+    place = "        return State(integral, slowed), TorqueCommand"
+    (tmp_path / "own.py").write_text(source.replace(place, f"        {result}\n{place}"))
+    built = assembly(
+        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
+    )
+    called, python = flown(built, (0, 1), threads=2), flown(built, (0, 1), compiled=False)
+    assert "law called in Python" in called.compiled
+    assert_same(called, python)
+
+
+@pytest.mark.parametrize("batched", [False, True])
+def test_a_called_law_of_many_vehicles_is_pythons(batched: bool, tmp_path: Path) -> None:
+    source = BATCHED.replace('torque.astype(str) + "?"', "0.5 * torque")
+    if not batched:
+        source = source.replace("batched = True", "batched = False")
+    (tmp_path / "own.py").write_text(source)
+    law = "law={kind='own.py:Law'}"
+    built = assembly("contraction-noise", "duration=0.1", law, *ERRORS, folder=tmp_path)
+    members = (0, 1, 2)
+    python = flown(built, members, compiled=False)
+    for threads in (1, 2):
+        called = flown(built, members, threads=threads)
+        assert called.compiled.startswith("sensors and actuators compiled; law called")
+        assert_same(called, python)
+    assert flown(built, [2]).bits(0) == python.bits(2)
+
+
+KEEPING = """
+from typing import NamedTuple
+import numpy as np
+from mjspace.contract import TorqueCommand
+
+class State(NamedTuple):
+    sum: np.ndarray
+
+class Law:
+    compiled = False
+
+    def __init__(self):
+        self.seen, self.torque = [], np.zeros(3)
+
+    def reset(self, measurement, reference):
+        return State(np.zeros(3))
+
+    def step(self, state, time, measurement, reference):
+        for array in (measurement.rate, state.sum, reference.attitude):
+            assert not array.flags.writeable
+            try:
+                array.setflags(write=True)
+            except ValueError:
+                continue
+            raise AssertionError("made writable")
+        self.seen.append((measurement, state, reference))
+        self.torque[:] = -5.0 * measurement.rate
+        return State(state.sum + measurement.rate), TorqueCommand(self.torque), None
+"""
+
+
+def test_what_a_called_law_keeps_does_not_change_and_its_own_arrays_are_copied(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "own.py").write_text(KEEPING)
+    built = assembly(
+        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
+    )
+    rows, law = flown(built).rows, getattr(built.law, "law")  # noqa: B009 - the user's own
+    assert len(rows["/truth.rate"]) == 101
+    np.testing.assert_array_equal(
+        [seen[0].rate for seen in law.seen], rows["/measurement.rate"][:, 0]
+    )
+    np.testing.assert_array_equal([seen[1].sum for seen in law.seen], rows["/state.law_sum"][:, 0])
+    np.testing.assert_array_equal(
+        [seen[2].attitude for seen in law.seen], rows["/reference.attitude"][:, 0]
+    )
+    np.testing.assert_array_equal(rows["/command.torque"], -5.0 * rows["/measurement.rate"])
+
+
+def test_a_called_law_divides_by_zero_without_warnings(tmp_path: Path) -> None:
+    built = own_law(tmp_path, "assert time >= 0.0; size = size / np.zeros(())")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        called = flown(built)
+    assert ("law called in Python" in called.compiled, called.trouble) == (True, "")
+
+
+def test_a_called_laws_change_of_shape_ends_the_flight_as_in_python(tmp_path: Path) -> None:
+    # To a shape that would be broadcast to the one before.
+    built = own_law(tmp_path, "error = error if time < 0.0605 else error[:1]")
+    source = (tmp_path / "own.py").read_text()
+    (tmp_path / "own.py").write_text(source.replace("np.concatenate([error, size[None]])", "error"))
+    built = assembly(
+        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
+    )
+    called, python = flown(built), flown(built, compiled=False)
+    assert "has the shape (1, 1) after (1, 3): shapes must not change" in called.trouble
+    assert_same(called, python)
+
+
+def test_actuators_under_a_called_law_have_the_motion_of_now(tmp_path: Path) -> None:
+    # Wheels at their speed limit cut the command by how fast they turn.
+    limit = "plant.wheels.speed_limit=30"
+    built = own_law(tmp_path, "torque *= -3.0 if time > 0.0 else 1.0", 0.4, limit)
+    called, python = flown(built), flown(built, compiled=False)
+    assert "law called in Python" in called.compiled
+    assert any("saturated" in event.message for event in python.events)
+    assert_same(called, python)
 
 
 def test_a_law_with_dice_is_noticed_and_flown_in_python(tmp_path: Path) -> None:
@@ -384,7 +419,7 @@ def test_a_wrong_program_is_noticed_and_the_flight_goes_on_in_python(
         calls += 1
         found = columns(self)
         if calls == 3:  # of the third block
-            found["command"]["torque"][0, 0, 1] *= 1.0 + 1e-15
+            found["command"]["torque"] = found["command"]["torque"] * (1.0 + 1e-15)
         return found
 
     monkeypatch.setattr(CompiledFlight, "columns", wrong)
@@ -428,16 +463,16 @@ def test_what_a_law_raises_ends_the_flight_as_in_python(tmp_path: Path) -> None:
 def test_an_error_of_mujoco_in_a_block_is_met_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     built = assembly("contraction-ideal", "duration=0.1")
     python, calls = flown(built, compiled=False), 0
-    flies = CompiledFlight.fly
+    flies = CompiledFlight.fly_periods
 
-    def failing(self: Any, desired: Any) -> None:
+    def failing(self: Any, count: int) -> None:
         nonlocal calls
         calls += 1
-        flies(self, desired)
+        flies(self, count)
         if calls == 2:
             raise SimulationError(np.array([0]), "no room", 1)
 
-    monkeypatch.setattr(CompiledFlight, "fly", failing)
+    monkeypatch.setattr(CompiledFlight, "fly_periods", failing)
     found = flown(built)
     assert "no room" in found.compiled
     assert_same(found, python)
@@ -451,16 +486,16 @@ def test_an_error_of_mujoco_where_the_law_is_called_is_met_in_python(
     noisy = "sensors.rate.noise_std=0.01"
     built = own_law(tmp_path, branch, 0.1, noisy)
     python, calls = flown(built, compiled=False), 0
-    flies = CompiledFlight.fly_period
+    flies = CompiledFlight.fly_to_instant
 
-    def failing(self: Any, command: Any) -> None:
+    def failing(self: Any, period: int) -> None:
         nonlocal calls
         calls += 1
         if calls == 60:
             raise SimulationError(np.array([0]), "no room", 1)
-        flies(self, command)
+        flies(self, period)
 
-    monkeypatch.setattr(CompiledFlight, "fly_period", failing)
+    monkeypatch.setattr(CompiledFlight, "fly_to_instant", failing)
     found = flown(built)
     assert (calls, "no room" in found.compiled) == (60, True)
     assert_same(found, python)
@@ -494,6 +529,59 @@ def test_a_command_that_is_no_numbers_any_more_ends_the_flight_as_in_python(
     assert "actuators compiled" in compiled.compiled
     assert "the law's command: torque is not numbers" in python.trouble
     assert_same(compiled, python)
+
+
+def _blocks_of(periods: int, built: Assembly, members: Sequence[int]) -> int:
+    """Return the ``BLOCK_BYTES`` of which blocks of these vehicles have so many periods."""
+    return periods * 4 * first_start(built, members).physics.nbytes
+
+
+def test_a_proof_is_good_for_the_short_blocks_that_follow(monkeypatch: pytest.MonkeyPatch) -> None:
+    built, members = assembly("contraction-noise", "duration=0.1", *ERRORS), (0, 1, 2)
+    python, by_python, sense = flown(built, members, compiled=False), [], Stepper.sense
+
+    def noted(self: Any, number: int) -> Any:
+        by_python.append(number)
+        return sense(self, number)
+
+    monkeypatch.setattr(loop, "BLOCK_BYTES", _blocks_of(10, built, members))
+    monkeypatch.setattr(Stepper, "sense", noted)
+    found = flown(built, members)
+    assert by_python == [0, 40, 80]
+    assert_same(found, python)
+
+
+def test_trouble_in_a_block_without_a_proof_of_its_own_is_met_in_python(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built = own_law(tmp_path, "torque = torque + np.where(time > 0.0605, np.inf, 0.0)")
+    python = flown(built, compiled=False)
+    monkeypatch.setattr(loop, "BLOCK_BYTES", _blocks_of(10, built, (0,)))
+    found = flown(built)
+    assert found.compiled == "flown in Python: MuJoCo warned"
+    assert "/command.torque is not finite" in found.trouble
+    assert_same(found, python)
+
+
+def test_an_error_of_mujoco_in_a_block_without_a_proof_of_its_own_is_met_in_python(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built, calls = own_law(tmp_path, "", 0.1, "sensors.rate.noise_std=0.01"), 0
+    python, flies = flown(built, compiled=False), CompiledFlight.fly_periods
+
+    def failing(self: Any, count: int) -> None:
+        nonlocal calls
+        calls += 1
+        flies(self, count)
+        if calls == 3:
+            raise SimulationError(np.array([0]), "no room", 1)
+
+    monkeypatch.setattr(loop, "BLOCK_BYTES", _blocks_of(10, built, (0,)))
+    monkeypatch.setattr(CompiledFlight, "fly_periods", failing)
+    found = flown(built)
+    assert calls == 3
+    assert re.fullmatch("flown in Python: .*no room", found.compiled)
+    assert_same(found, python)
 
 
 def test_stop_ends_it_after_the_block() -> None:

@@ -1,5 +1,6 @@
 """MuJoCo's batch through its C interface, against MuJoCo's own in Python."""
 
+import ctypes
 import gc
 import weakref
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch, SimulationError
 
+from mjspace.environment import struct_offsets
 from mjspace.simulation import native_batch
 from mjspace.simulation.native_batch import NativeBatch, address
 
@@ -65,6 +67,39 @@ def test_states_are_those_of_mujocos_own_batch(pendulum: Any, threads: int) -> N
     native.state[...] = rows(pendulum, 5)
     native.apply(address("mj_step"), 0)
     assert (alike.state[1:] != native.state[1:]).any(axis=1).all()
+
+
+def test_fields_may_follow_those_of_another_batch(pendulum: Any) -> None:
+    native, own = NativeBatch(pendulum, 3, 2, {}), Batch(pendulum, 3, 1)
+    native.state[...] = own.state[...] = rows(pendulum, 3)
+    for heavier in (1.0, 3.0, 2.0):
+        mass = own.expand("body_mass")
+        mass[:, 1] = heavier * np.arange(1.0, 4.0)
+        own.set_const()
+        native.follow({"body_mass": mass})
+        native.apply(address("mj_step"), 0)
+        own.step()
+        assert native.state.tobytes() == own.state.tobytes()
+
+
+def test_what_a_function_changes_of_its_threads_model_is_gone_at_the_next_vehicle(
+    pendulum: Any,
+) -> None:
+    word, found = struct_offsets.find()[0].body_mass, []
+
+    def halve(model: int, data: int, vehicle: int, argument: int) -> None:
+        address = ctypes.c_int64.from_address(model + struct_offsets.WORD * word).value
+        mass = (ctypes.c_double * 2).from_address(address)
+        found.append(mass[1])
+        mass[1] *= 0.5
+
+    kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 2, ctypes.c_int, ctypes.c_void_p)
+    function = kind(halve)
+    native = NativeBatch(pendulum, 3, 1, {}, {"body_mass"})
+    for _ in range(2):
+        native.apply(ctypes.cast(function, ctypes.c_void_p).value, 0)
+    assert found == [1.0] * 6
+    assert pendulum.body_mass[1] == 1.0
 
 
 def test_warnings_are_counted_by_vehicle_and_kind(pendulum: Any) -> None:

@@ -374,7 +374,7 @@ def test_a_batched_law_without_a_vehicle_axis_is_named(tmp_path: Path) -> None:
         (law(GOOD) + "del Source.at", r"reference: own\.py:Source has no method at\(time\)"),
         (
             law(GOOD) + "push = 3",
-            r"environment\.python: own\.py:push is not a function of \(time, truth\): int",
+            r"environment\.python: own\.py:push is neither a class nor a function: int",
         ),
     ],
 )
@@ -452,9 +452,9 @@ def push(time, truth):
         "rates.physics='5 ms'",
     )
     with_sensor = flown(tmp_path, code, *orbit, "sensors.magnetic_field={}")
-    from mjspace.scenario.construct import load_object
+    from mjspace.scenario.user_files import load_file
 
-    seen = load_object("own.py:SEEN", tmp_path)
+    seen = load_file(tmp_path / "own.py").SEEN
     field = with_sensor[0].rows["/truth"]["magnetic_field"][:, 0]
     assert [time for time, _ in seen] == pytest.approx(0.005 * np.arange(101))
     for (_, truth), expected in zip(seen[::2], field, strict=True):

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from mjspace import attitude
-from mjspace.constants import GM
 from mjspace.contract import Array
+from mjspace.environment.constants import GM
 from mjspace.validation.benchmarks import debra_delp
 from mjspace.validation.benchmarks.gravity_gradient import (
     INERTIA,

@@ -21,7 +21,8 @@ from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
 from mjspace.vehicle import indices
 from mjspace.vehicle import vehicle as plant
-from mjspace.vehicle.deployments import Boom, Deployment
+from mjspace.vehicle.deployed_parts import Boom
+from mjspace.vehicle.deployments import Deployment
 
 RATE = 2.0 * np.pi / 5600.0  # rad/s, of the orbit
 REDUCED = 2.0 * 100.0 / 102.0  # kg, of the tip against the bus

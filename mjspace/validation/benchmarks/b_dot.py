@@ -7,8 +7,8 @@ import numpy as np
 from scipy.integrate import simpson, solve_ivp
 
 from mjspace import attitude
-from mjspace.constants import GM
 from mjspace.contract import Array
+from mjspace.environment.constants import GM
 from mjspace.environment.orbit import Orbit
 from mjspace.validation import stand
 from mjspace.validation.benchmark import (

@@ -8,8 +8,8 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.special import ellipk
 
 from mjspace import attitude
-from mjspace.constants import GM
 from mjspace.contract import Array
+from mjspace.environment.constants import GM
 from mjspace.environment.orbit import Orbit
 from mjspace.scenario.environment import Environment
 from mjspace.validation import meter, stand

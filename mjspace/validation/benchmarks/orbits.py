@@ -3,8 +3,8 @@
 import numpy as np
 
 from mjspace import attitude
-from mjspace.constants import GM
 from mjspace.contract import Array
+from mjspace.environment.constants import GM
 from mjspace.environment.orbit import Orbit
 from mjspace.scenario.environment import Environment
 from mjspace.validation import meter, stand

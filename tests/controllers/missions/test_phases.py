@@ -11,9 +11,10 @@ from mjspace.controllers.missions.phases import Phases
 from mjspace.contract import Array, Measurement, Reference
 from mjspace.runner.replay import verify
 from mjspace.runner.run import run
-from mjspace.scenario.construct import construct, load_object
+from mjspace.scenario.construct import construct
 from mjspace.scenario.loading import load, to_toml
 from mjspace.scenario.scenario import Component
+from mjspace.scenario.trust import Trust
 
 FACTS = {"wheel_axes": np.eye(3), "wheel_inertia": np.full(3, 0.05), "control_period": 0.1}
 REST = Reference(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
@@ -30,7 +31,7 @@ TABLE = [
 
 def built(table: Any = TABLE) -> tuple[Any, Component]:
     component = Component.model_validate({"kind": "phases:Phases", "phases": table})
-    return construct(component, Phases, FACTS, Path())
+    return construct(component, Phases, FACTS, Trust(Path()))
 
 
 def seen(*rates: Any) -> Measurement:
@@ -180,4 +181,4 @@ def test_a_mission_can_be_written_and_read_again(tmp_path: Path) -> None:
     scenario, _ = load("mission")
     (tmp_path / "again.toml").write_text(to_toml(scenario))
     assert load(tmp_path / "again.toml")[0] == scenario
-    assert load_object(scenario.law.kind, tmp_path) is Phases
+    assert Trust(tmp_path).load(scenario.law.kind) is Phases

@@ -1,0 +1,15 @@
+"""Angular momentum of reaction wheels in body axes."""
+
+from typing import Any
+
+from mjspace.algebra import times, transpose
+from mjspace.contract import Array, Measurement
+
+
+def wheel_momentum(law: Any, measurement: Measurement) -> Array:
+    """Return h = sum a Jw (a.w + Omega) [N m s], (..., 3), absolute, from the tachometers.
+
+    ``law`` has ``wheel_axes`` a (n, 3) and ``wheel_inertia`` Jw (n,) [kg m^2].
+    """
+    spin = times(law.wheel_axes, measurement.rate) + measurement.wheel_speed
+    return times(transpose(law.wheel_axes), law.wheel_inertia * spin)

@@ -1,0 +1,47 @@
+"""Scenarios and options with mistakes are obeyed, or refused in one line."""
+
+import os
+import time
+from itertools import islice
+from pathlib import Path
+
+import options
+import outcomes
+import pytest
+import scenarios
+
+import mjspace
+from mjspace import cli
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_mistake_in_a_scenario_is_a_traceback(seed: int, tmp_path: Path) -> None:
+    for name, text in islice(scenarios.cases(seed), 12):
+        folder = tmp_path / name
+        folder.mkdir()
+        assert not list(scenarios.attack(name, text, folder)), name
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_mistake_in_an_option_is_a_traceback(seed: int, tmp_path: Path) -> None:
+    short = ["duration=0.05", "checks=[]"]
+    log = mjspace.run("contraction-ideal", overrides=short, out=tmp_path / "log").path
+    for name, given in islice(options.cases(seed), 12):
+        folder = tmp_path / name
+        folder.mkdir()
+        assert not list(options.attack(given, log, folder)), name
+
+
+def test_faults_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def of(main: object) -> str:
+        monkeypatch.setattr(cli, "main", main)
+        return "; ".join(outcomes.faults(outcomes.outcome(("info",), tmp_path, limit=0.5)))
+
+    monkeypatch.setattr(outcomes, "LIMIT", 0.5)
+    assert of(lambda: None) == ""
+    assert "ZeroDivisionError" in of(lambda: 1 / 0)
+    assert "killed by signal 6" in of(os.abort)
+    assert "hangs" in of(lambda: time.sleep(60.0))
+    assert "status 7" in of(lambda: exit(7))
+    assert "0 lines on stderr" in of(lambda: exit(2))
+    assert "GiB" in of(lambda: bytes(outcomes.MEMORY) + b"x")
