@@ -13,6 +13,7 @@ from mcap.reader import make_reader
 
 from mjspace.errors import InputError
 from mjspace.log import salvage
+from mjspace.log.content import unpacked
 from mjspace.log.index import inventory
 from mjspace.log.reader import Log
 from mjspace.log.recover import Recovered, recover
@@ -153,11 +154,11 @@ def test_false_chunks_take_no_more_time_than_the_file_is_long(
 ) -> None:
     """Each of these claims all that follows: all of them together are n (n + 1) / 2."""
     tried = []
-    true = salvage.unpacked
+    true = unpacked
 
     def counted(file: object, place: object) -> bytes:
         tried.append(place.size)  # type: ignore[attr-defined]
-        return true(file, place)  # type: ignore[arg-type]
+        return true(file, place)
 
     monkeypatch.setattr(salvage, "unpacked", counted)
     monkeypatch.setattr(salvage, "MOST", 0)
