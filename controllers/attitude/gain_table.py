@@ -3,10 +3,10 @@
 from typing import Any
 
 import numpy as np
-from numba import guvectorize
 from scipy.interpolate import CubicSpline
 
 from mjspace.contract import Array
+from mjspace.gufunc import gufunc
 
 
 class GainTable:
@@ -23,7 +23,7 @@ class GainTable:
         return matrix
 
 
-@guvectorize(["void(f8[:, :, :, :], f8, f8, f8[:, :])"], "(n,k,i,j),(),()->(i,j)", cache=True)
+@gufunc(["void(f8[:, :, :, :], f8, f8, f8[:, :])"], "(n,k,i,j),(),()->(i,j)")
 def _at(coefficients: Any, step: Any, time: Any, matrix: Any) -> None:
     pieces = coefficients.shape[0]
     now = min(max(time, 0.0), pieces * step)

@@ -12,10 +12,11 @@ from math import cos, pi, sin
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numba import guvectorize, njit
+from numba import njit
 
 from mjspace import attitude as att
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
+from mjspace.gufunc import gufunc
 
 
 class State(NamedTuple):
@@ -73,7 +74,7 @@ class ImmersionInvariance(Gains):
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the next state, the torque and the errors."""
         measured = measurement.attitude, measurement.rate, measurement.wheel_speed
-        torque, x_e, z, *angles = _law(*measured, *reference, *state, *self._vehicle)
+        torque, x_e, z, *angles = _law.ufunc(*measured, *reference, *state, *self._vehicle)
         after = State(*angles)
         singularity = 0.5 * pi - np.abs(after.angles[..., 1:2])
         return after, TorqueCommand(torque), Signals(x_e, z, singularity)
@@ -118,10 +119,9 @@ def _drift(x: Any, dx: Any, w: Any) -> Any:
     return dswing * tp + swing * dx[1] / (cp * cp), -swing * dx[0], yaw
 
 
-@guvectorize(
+@gufunc(
     [f"void({'f8[:],' * 8}f8[:,:],f8[:,:],{'f8[:],' * 6}f8[:])"],
     "(q),(v),(n),(q),(v),(v),(v),(v),(v,v),(n,v),(n),(g)->(v),(v),(v),(v),(v)",
-    cache=True,
 )
 def _law(
     q: Any, w: Any, wheel_speed: Any, qd: Any, wr: Any, ar: Any, before: Any, desired_before: Any,

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
-import numba
-
 from mjspace.contract import Array, Gains, Measurement, Reference, Unit, gain
+from mjspace.gufunc import gufunc
 
 from ..attitude.linear_quadratic import Regulator, Signals
 
@@ -88,7 +87,7 @@ class MagneticUnloading(Regulator):
         return state, Command(wheels.torque - torque, dipole), signals
 
 
-@numba.guvectorize(["void(f8[:],f8[:],f8,f8[:],f8[:])"], "(k),(k),()->(k),(k)", cache=True)
+@gufunc(["void(f8[:],f8[:],f8,f8[:],f8[:])"], "(k),(k),()->(k),(k)")
 def _unload(h: Any, B: Any, k: Any, m: Any, torque: Any) -> None:
     """Write m = k (h x B)/B^2 [A m^2] and its torque m x B [N m]."""
     share = k / (B[0] * B[0] + B[1] * B[1] + B[2] * B[2])

@@ -78,6 +78,7 @@ def _command(arguments: Sequence[str], folder: Path) -> int:
     os.chdir(folder)
     for name, stream in ((".out", 1), (".err", 2)):
         os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), stream)
+    sys.stdout, sys.stderr = (os.fdopen(stream, "w", closefd=False) for stream in (1, 2))
     sys.argv = ["mjspace", *arguments]
     status = 0
     try:
