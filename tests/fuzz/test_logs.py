@@ -11,6 +11,12 @@ import pytest
 import mjspace
 
 
+@pytest.fixture(autouse=True)
+def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A renderer that other tests have used in this process hangs in a fork of it."""
+    monkeypatch.setattr(log_attack, "OTHERS", ("json", "replay"))
+
+
 @pytest.fixture(scope="module")
 def bases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("bases")
