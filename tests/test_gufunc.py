@@ -40,3 +40,10 @@ def test_one_process_compiles_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None
     assert twice.ufunc([1.0, 2.0]).tolist() == [2.0, 4.0]
     assert free == [False]
     assert is_free(folder)
+
+
+def test_nothing_is_compiled_past_the_lock() -> None:
+    root = Path(__file__).parents[1]
+    modules = [*root.glob("mjspace/**/*.py"), *root.glob("controllers/**/*.py")]
+    users = [path.name for path in modules if "import guvectorize" in path.read_text()]
+    assert users == ["gufunc.py"]

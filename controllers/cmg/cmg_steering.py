@@ -14,9 +14,10 @@ direction.
 import math
 from typing import Any, NamedTuple
 
-from numba import guvectorize, njit
+from numba import njit
 
 from mjspace.contract import Array
+from mjspace.gufunc import gufunc
 
 _DITHER_RATE = 0.5 * math.pi  # rad/s, Wie et al.
 
@@ -37,7 +38,7 @@ def momentum(cluster: Cluster, gimbal_angle: Array, wheel_speed: Array) -> Array
 
     ``gimbal_angle`` [rad] and ``wheel_speed`` [rad/s] are (..., n).
     """
-    h: Array = _momentum(*cluster, gimbal_angle, wheel_speed)
+    h: Array = _momentum.ufunc(*cluster, gimbal_angle, wheel_speed)
     return h
 
 
@@ -59,7 +60,7 @@ def steer(
     exact. E is symmetric, with ones on its diagonal and e0 sin(pi t/2 + phase) off it. Null motion
     gives no torque; it is along the gradient of m^2, times m^2 so that it is regular everywhere.
     """
-    rate, measure, damping = _steer(torque, gimbal_angle, wheel_speed, *cluster, time, gains)
+    rate, measure, damping = _steer.ufunc(torque, gimbal_angle, wheel_speed, *cluster, time, gains)
     return rate, measure, damping
 
 
@@ -98,9 +99,7 @@ def _dot(a: Any, b: Any) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@guvectorize(
-    ["void(f8[:,:],f8[:,:],f8[:],f8[:],f8[:],f8[:])"], "(n,v),(n,v),(n),(n),(n)->(v)", cache=True
-)
+@gufunc(["void(f8[:,:],f8[:,:],f8[:],f8[:],f8[:],f8[:])"], "(n,v),(n,v),(n),(n),(n)->(v)")
 def _momentum(g: Any, s0: Any, Jw: Any, angle: Any, speed: Any, h: Any) -> None:
     h[:] = 0.0
     for i in range(angle.size):
@@ -109,10 +108,9 @@ def _momentum(g: Any, s0: Any, Jw: Any, angle: Any, speed: Any, h: Any) -> None:
             h[k] += Jw[i] * speed[i] * s[k]
 
 
-@guvectorize(
+@gufunc(
     ["void(f8[:],f8[:],f8[:],f8[:,:],f8[:,:],f8[:],f8[:],f8[:],f8[:],f8[:],f8[:])"],
     "(v),(n),(n),(n,v),(n,v),(n),(o),(k)->(n),(o),(o)",
-    cache=True,
 )
 def _steer(
     torque: Any, angle: Any, speed: Any, g: Any, s0: Any, Jw: Any, time: Any, gains: Any,

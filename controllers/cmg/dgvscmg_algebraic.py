@@ -16,9 +16,9 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import guvectorize
 
 from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
+from mjspace.gufunc import gufunc
 
 from ..motors import motor_loops
 from . import dgvscmg
@@ -158,10 +158,9 @@ class Algebraic(dgvscmg.Cascade):
         return np.array([*own, *self.vibration, *self.turned_inertia])
 
 
-@guvectorize(
+@gufunc(
     ["void(f8[:],f8[:],f8[:],f8[:],f8[:],f8[:],f8[:],f8[:],f8[:])"],
     "(m),(m),(m),(m),(g)->(m),(m),(m),(m)",
-    cache=True,
 )
 def _advance(
     angle: Any, speed: Any, drive: Any, rate: Any, model: Any,

@@ -18,9 +18,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import guvectorize, njit
+from numba import njit
 
 from mjspace.contract import Array
+from mjspace.gufunc import gufunc
 
 
 def torque_matrix(gimbal_angle: Array, wheel_speed: Array, wheel_inertia: float) -> Array:
@@ -58,7 +59,7 @@ def steer(
     The authority (..., 1) is the distance from the singularity, Jw |W cos(di)| [N m s]: the torque
     about gi per rad/s of the outer gimbal.
     """
-    eta, authority = _steer(
+    eta, authority = _steer.ufunc(
         torque, gimbal_angle, wheel_speed, wheel_inertia, damping, momentum_damping
     )
     return eta, authority
@@ -79,7 +80,7 @@ def steer_as_printed(
     -47.8 deg, and the command is reversed in between. With ``zeta`` = -10, as the text intends, it
     is zero at -89.43 and 90.57 deg.
     """
-    eta, authority = _steer_as_printed(
+    eta, authority = _steer_as_printed.ufunc(
         torque, gimbal_angle, wheel_speed, wheel_inertia, gamma_0, zeta
     )
     return eta, authority
@@ -103,7 +104,7 @@ def momentum(
     inertia: Array, rate: Array, gimbal_angle: Array, wheel_speed: Array, wheel_inertia: float
 ) -> Array:
     """Return h = Mb w + Jw W s [N m s], body axes, (..., 3), of the bus (3, 3) and the wheel."""
-    h: Array = _momentum(inertia, rate, gimbal_angle, wheel_speed, wheel_inertia)
+    h: Array = _momentum.ufunc(inertia, rate, gimbal_angle, wheel_speed, wheel_inertia)
     return h
 
 
@@ -129,7 +130,7 @@ def gimbal_load(
     axes; ``eta`` (..., 3) is do', di' [rad/s], W' [rad/s^2], commanded or measured; the others are
     as in ``torque_matrix``. Exact for a wheel of three equal inertias.
     """
-    load: Array = _gimbal_load(rate, gimbal_angle, eta, wheel_speed, wheel_inertia)
+    load: Array = _gimbal_load.ufunc(rate, gimbal_angle, eta, wheel_speed, wheel_inertia)
     return load
 
 
@@ -157,9 +158,7 @@ def _rates(torque: Any, angle: Any, per_h: float, Jw: float, inverse: float, eta
 _INPUTS = "(v),(g),(n),()"  # torque or rate, gimbal angles, wheel speed, wheel inertia
 
 
-@guvectorize(
-    ["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_INPUTS},(),()->(v),(n)", cache=True
-)
+@gufunc(["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_INPUTS},(),()->(v),(n)")
 def _steer(
     torque: Any, angle: Any, speed: Any, Jw: Any, damping: Any, h0: Any, eta: Any, authority: Any
 ) -> None:
@@ -169,9 +168,7 @@ def _steer(
     authority[0] = abs(h * cosine)
 
 
-@guvectorize(
-    ["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_INPUTS},(),()->(v),(n)", cache=True
-)
+@gufunc(["void(f8[:],f8[:],f8[:],f8,f8,f8,f8[:],f8[:])"], f"{_INPUTS},(),()->(v),(n)")
 def _steer_as_printed(
     torque: Any, angle: Any, speed: Any, Jw: Any, gamma_0: Any, zeta: Any, eta: Any, authority: Any
 ) -> None:
@@ -181,7 +178,7 @@ def _steer_as_printed(
     authority[0] = abs(Jw * speed[0] * cosine)
 
 
-@guvectorize(["void(f8[:],f8[:],f8[:],f8[:],f8,f8[:])"], "(v),(g),(v),(n),()->(g)", cache=True)
+@gufunc(["void(f8[:],f8[:],f8[:],f8[:],f8,f8[:])"], "(v),(g),(v),(n),()->(g)")
 def _gimbal_load(rate: Any, angle: Any, eta: Any, speed: Any, Jw: Any, load: Any) -> None:
     s, gi, _ = _axes(angle)
     w = (rate[0] + eta[1] * gi[0], rate[1] + eta[1] * gi[1], rate[2] + eta[0])
@@ -192,14 +189,14 @@ def _gimbal_load(rate: Any, angle: Any, eta: Any, speed: Any, Jw: Any, load: Any
     load[0], load[1] = z, gi[0] * x + gi[1] * y
 
 
-@guvectorize(["void(f8[:,:],f8[:],f8[:],f8[:],f8,f8[:])"], "(v,v),(v),(g),(n),()->(v)", cache=True)
+@gufunc(["void(f8[:,:],f8[:],f8[:],f8[:],f8,f8[:])"], "(v,v),(v),(g),(n),()->(v)")
 def _momentum(inertia: Any, rate: Any, angle: Any, speed: Any, Jw: Any, momentum: Any) -> None:
     s, _, _ = _axes(angle)
     for i in range(3):
         momentum[i] = _dot(inertia[i], rate) + Jw * speed[0] * s[i]
 
 
-@guvectorize(["void(f8[:],f8[:],f8[:],f8[:])"], "(v),(g),(g)->(v)", cache=True)
+@gufunc(["void(f8[:],f8[:],f8[:],f8[:])"], "(v),(g),(g)->(v)")
 def _carried(rate: Any, angle: Any, turn: Any, carried: Any) -> None:
     s, _, _ = _axes(angle)
     carried[0] = carried[1] = 0.0

@@ -99,7 +99,7 @@ class VariableStructure(GimballedEngine):
         """Return the next state, the thrust and gimbal angles, and the errors."""
         cut = touched(state.cut, measurement)
         at, desired = measurement, reference
-        Z, S, commanded, limited = kernels.variable_structure(
+        Z, S, commanded, limited = kernels.variable_structure.ufunc(
             at.attitude, at.rate, at.position, at.velocity,
             desired.attitude, desired.position, desired.velocity, desired.linear_acceleration,
             *self._gains[:-2], self._engine(at.propellant), self._gains[-1],

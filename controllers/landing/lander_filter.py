@@ -92,7 +92,7 @@ class Navigation(LunarGravity):
         """Return the estimates a period later, or at the same instant right after ``fix``."""
         rate, force = measurement.rate, measurement.specific_force
         aid = np.concatenate([measurement.altitude, measurement.ground_velocity], axis=-1)
-        found = kernels.predict_and_correct(*estimate, rate, force, aid, self._numbers)
+        found = kernels.predict_and_correct.ufunc(*estimate, rate, force, aid, self._numbers)
         position, velocity, attitude, bias, covariance = found
         return FilterState(position, velocity, attitude, bias, covariance, rate.copy(), aid)
 

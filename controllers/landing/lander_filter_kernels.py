@@ -9,7 +9,9 @@ from math import cos, sin, sqrt
 from typing import Any
 
 import numpy as np
-from numba import guvectorize, njit
+from numba import njit
+
+from mjspace.gufunc import gufunc
 
 
 @njit
@@ -99,10 +101,9 @@ def _correct(x: Any, P: Any, row: Any, innovation: Any, noise: Any) -> None:
             P[i, j] -= covariance[i] * covariance[j] / variance
 
 
-@guvectorize(
+@gufunc(
     [f"void({'f8[:],' * 4}f8[:,:],{'f8[:],' * 10}f8[:,:])"],
     "(v),(v),(q),(b),(n,n),(v),(a),(v),(v),(a),(g)->(v),(v),(q),(b),(n,n)",
-    cache=True,
 )
 def predict_and_correct(
     p: Any, v: Any, q: Any, b: Any, P: Any, last_rate: Any, last_aid: Any,

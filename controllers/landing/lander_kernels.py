@@ -4,7 +4,9 @@
 from math import atan2, cos, hypot, pi, sin, sqrt, tanh
 from typing import Any
 
-from numba import guvectorize, njit
+from numba import njit
+
+from mjspace.gufunc import gufunc
 
 POLAR, SCALED, FROZEN = 0.0, 1.0, 2.0
 """Coordinates of the horizontal position; see ``lander.VariableStructure``."""
@@ -63,10 +65,9 @@ def _needed_thrust(p: Any, acceleration: Any, mu: Any, radius: Any) -> Any:
     return acceleration[2] + mu * x / (square * sqrt(square))
 
 
-@guvectorize(
+@gufunc(
     [f"void({'f8[:],' * 8}f8[:,:],{'f8[:],' * 8}f8[:])"],
     "(q),(v),(v),(v),(q),(v),(v),(v),(v,z),(c),(v),(v),(e),(m)->(z),(v),(v),(v)",
-    cache=True,
 )
 def variable_structure(
     q: Any, w: Any, p: Any, v: Any, q_d: Any, p_d: Any, v_d: Any, a_d: Any,

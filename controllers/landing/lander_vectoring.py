@@ -13,9 +13,10 @@ from math import asin, cos, hypot, sqrt
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numba import guvectorize, njit
+from numba import njit
 
 from mjspace.contract import Array, Measurement, ThrustCommand, Trajectory, gain
+from mjspace.gufunc import gufunc
 
 from .lander import burning, touched
 from .lander_gains import GimballedEngine
@@ -103,7 +104,7 @@ class ThrustVectoring(GimballedEngine):
         """Return the next state, the thrust and gimbal angles, and the errors."""
         cut = touched(state.cut, measurement)
         at = measurement
-        error, pointing, commanded, limited, integral = _law(
+        error, pointing, commanded, limited, integral = _law.ufunc(
             at.attitude, at.rate, at.position, at.velocity,
             *reference, state.integral, self.inertia, self._gains,
         )  # fmt: skip
@@ -154,10 +155,9 @@ def _desired_force(p: Any, v: Any, p_d: Any, v_d: Any, a_d: Any, integral: Any, 
     return share * f[0], share * f[1], f[2]
 
 
-@guvectorize(
+@gufunc(
     [f"void({'f8[:],' * 11}f8[:,:],{'f8[:],' * 5}f8[:])"],
     "(q),(v),(v),(v),(q),(v),(v),(v),(v),(v),(v),(v,v),(g)->(v),(v),(v),(v),(v)",
-    cache=True,
 )
 def _law(
     q: Any, w: Any, p: Any, v: Any, q_d: Any, w_d: Any, dw_d: Any, p_d: Any, v_d: Any, a_d: Any,

@@ -18,9 +18,9 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from numba import guvectorize
 
 from mjspace.contract import Array
+from mjspace.gufunc import gufunc
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def held_in_stator(voltage: Array, angle: Array, swept: Array, limit: float = in
     return after
 
 
-@guvectorize(["void(f8[:,:],f8[:],f8[:,:])"], "(m,k),(m)->(m,k)", cache=True)
+@gufunc(["void(f8[:,:],f8[:],f8[:,:])"], "(m,k),(m)->(m,k)")
 def _turned(vector: Any, angle: Any, after: Any) -> None:
     for n in range(angle.size):
         turn = complex(np.cos(angle[n]), np.sin(angle[n]))
@@ -113,7 +113,7 @@ def _turned(vector: Any, angle: Any, after: Any) -> None:
         after[n, 0], after[n, 1] = there.real, there.imag
 
 
-@guvectorize(["void(f8[:,:],f8[:],f8[:],f8,f8[:,:])"], "(m,k),(m),(m),()->(m,k)", cache=True)
+@gufunc(["void(f8[:,:],f8[:],f8[:],f8,f8[:,:])"], "(m,k),(m),(m),()->(m,k)")
 def _held(voltage: Any, angle: Any, swept: Any, limit: Any, after: Any) -> None:
     for n in range(angle.size):
         half = 0.5 * swept[n]
@@ -126,10 +126,8 @@ def _held(voltage: Any, angle: Any, swept: Any, limit: Any, after: Any) -> None:
         after[n, 0], after[n, 1] = there.real, there.imag
 
 
-@guvectorize(
-    ["void(f8[:,:],f8[:,:],f8[:,:],f8[:],f8[:,:],f8[:,:])"],
-    "(m,s),(m,k),(m,k),(m),(g,m)->(m,s)",
-    cache=True,
+@gufunc(
+    ["void(f8[:,:],f8[:,:],f8[:,:],f8[:],f8[:,:],f8[:,:])"], "(m,s),(m,k),(m,k),(m),(g,m)->(m,s)"
 )
 def _observe(
     memory: Any, current: Any, voltage: Any, acceleration: Any, gains: Any, after: Any

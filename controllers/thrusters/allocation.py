@@ -6,9 +6,10 @@ All arrays may have leading vehicle axes.
 from typing import Any
 
 import numpy as np
-from numba import guvectorize, njit
+from numba import njit
 
 from mjspace.contract import Array
+from mjspace.gufunc import gufunc
 
 _SMALL = 1e-12
 
@@ -95,7 +96,7 @@ def _least_squares(effects: Any, desired: Any, chosen: Any, count: int, solution
         solution[j] /= r[j, j]
 
 
-@guvectorize(["void(f8[:],f8[:,:],f8[:])"], "(m),(m,n)->(n)", cache=True)
+@gufunc(["void(f8[:],f8[:,:],f8[:])"], "(m),(m,n)->(n)")
 def _share(desired: Any, effects: Any, shares: Any) -> None:
     m, n = effects.shape
     chosen = np.zeros(n, np.int64)  # the first `count` of them are free, all others zero
