@@ -5,6 +5,7 @@ import resource
 import sys
 import time
 import traceback
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -80,6 +81,7 @@ def _command(arguments: Sequence[str], folder: Path) -> int:
         os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), stream)
     sys.stdout, sys.stderr = (os.fdopen(stream, "w", closefd=False) for stream in (1, 2))
     sys.argv = ["mjspace", *arguments]
+    warnings.simplefilter("default")  # pytest makes errors of them
     status = 0
     try:
         cli.main()
