@@ -181,8 +181,8 @@ def _cross(program: Program, a: Any, b: Any) -> Any:
 def _dot(program: Program, a: Any, b: Any) -> Any:
     if np.ndim(a) == 0 or np.ndim(b) == 0:
         return _call(program, np.multiply, a, b)
-    if np.ndim(a) > 2 or np.ndim(b) > 2:
-        raise Untraceable("np.dot of more than matrices: np.matmul can be")
+    if np.ndim(a) > 1 or np.ndim(b) > 1:
+        raise Untraceable("np.dot of matrices, which may round unlike np.matmul: that can be")
     product = _call(program, np.matmul, a, b)
     if np.asarray(np.dot(a, b)).tobytes() != product.tobytes():
         raise Untraceable("np.dot, which rounds unlike np.matmul here")

@@ -153,7 +153,6 @@ MOVES: list[Callable[[Any, Any], Any]] = [
     lambda x, y: np.outer(x[0], y[:, 1:]),
     lambda x, y: np.outer([1.0, -2.0], x.T),
     lambda x, y: np.dot(x[1], y[2]) + np.dot(2.0, x[0]),
-    lambda x, y: np.dot(x[:, :3], y) + np.dot(x, y[0])[:, None],
     lambda x, y: np.concatenate([x > 0.0, y > x]),
     lambda x, y: np.concatenate([x > 0.0, y]),
     lambda x, y: (np.zeros_like(x) + x.shape[0] + np.size(y) + len(x), np.ones_like(x[0])),
