@@ -1,5 +1,6 @@
 """Its presence puts this folder on the path: ``from oracle import fly`` works in every test."""
 
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,12 @@ from mjspace.runner.run import run
 settings.register_profile("ci", derandomize=True)
 if os.environ.get("CI"):
     settings.load_profile("ci")
+
+
+@pytest.fixture
+def one_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a short flight be one block on a slow machine too."""
+    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_SECONDS", math.inf)
 
 
 @pytest.fixture(scope="session")

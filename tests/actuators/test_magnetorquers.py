@@ -113,6 +113,7 @@ def test_moment_follows_with_a_lag() -> None:
     np.testing.assert_allclose(step * np.sum(means, axis=0), goal * total, rtol=1e-13)
 
 
+@pytest.mark.usefixtures("one_block")
 def test_magnetometer_shows_the_field_in_body_axes() -> None:
     built = assemble(*load("b-dot-igrf", ["duration=200", "sensors.magnetic_field.noise_std=0"]))
     (block,) = fly(built, first_start(built, [0]))
@@ -127,6 +128,7 @@ def test_magnetometer_shows_the_field_in_body_axes() -> None:
     assert np.abs(outside["torque"]).max() > 1e-4
 
 
+@pytest.mark.usefixtures("one_block")
 def test_a_batch_is_as_one_and_a_replay_too(tmp_path: Path) -> None:
     overrides = ["duration=60", "checks=[]", "rates.physics=1"]
     built = assemble(*load("b-dot-igrf", overrides))

@@ -58,6 +58,7 @@ def test_they_turn_the_bus_beside_wheels_and_burn_for_it(tmp_path: Path) -> None
     assert verify(flown.path, start=0.3, trust=True) is None
 
 
+@pytest.mark.usefixtures("one_block")
 def test_a_batch_is_as_one_and_its_tanks_empty() -> None:
     built = assemble(*load("detumble-thrusters", ["duration=0.5", "checks=[]"]))
     (one,), (many,) = (list(fly(built, first_start(built, range(n)), range(n))) for n in (1, 3))
