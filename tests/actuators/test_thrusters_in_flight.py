@@ -4,6 +4,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pytest
 
 from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.rendering.scene import Stage
