@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 FENCE = re.compile(r'^```(\w+)(?: title="(into )?(\S+)")?\n(.*?)^```$', re.M | re.S)
-ABOVE = "    python: str | None"
+ABOVE = "    python: KindName | None"
 """The line above which the recipe has its own written."""
 
 
