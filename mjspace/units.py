@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self, get_type_hints
 
+OUT_OF_SCALE = "its size is not from 1e-100 to 1e100"
+"""What is said of a number that ``is_out_of_scale``."""
+
 _MOST_PERIODS = 1e10
 _DEG = math.pi / 180.0
 _RPM = 2.0 * math.pi / 60.0
@@ -241,5 +244,5 @@ def _split(value: str) -> tuple[float, str]:
     except ValueError:
         raise ValueError(f"got {value!r}, should be a number or a number with a unit") from None
     if is_out_of_scale(number):
-        raise ValueError(f"got {value!r}: its size is not from 1e-100 to 1e100")
+        raise ValueError(f"got {value!r}: {OUT_OF_SCALE}")
     return number, " ".join(written.split())

@@ -92,12 +92,12 @@ class Trust:
         have = controllers()
         full: str | None = have.get(name.removeprefix(f"{GROUP}."))
         full = full or _entry_points().get(name) or (name if self._trusts(name) else None)
-        try:
-            if full is not None:
+        if full is not None:
+            try:
                 return importlib.import_module(full)
-        except ModuleNotFoundError as error:
-            if error.name is None or not f"{full}".startswith(error.name):
-                raise ValueError(f"{name!r} cannot be imported: {error}") from error
+            except ModuleNotFoundError as error:
+                if error.name is None or not full.startswith(error.name):
+                    raise ValueError(f"{name!r} cannot be imported: {error}") from error
         raise ValueError(
             f"no module {name!r} in {GROUP}{nearest(name, sorted(have))}; a file of your own is "
             f"named as 'file.py:Class', an installed module needs an entry point or --trust"
@@ -127,7 +127,6 @@ def _entry_points() -> dict[str, str]:
 
 def _belongs_to(found: Any, module: ModuleType) -> bool:
     """Return whether a class or function is the module's, or its package's, own."""
-    package = (
-        GROUP if module.__name__.startswith(f"{GROUP}.") else module.__name__.partition(".")[0]
-    )
+    is_ours = module.__name__.startswith(f"{GROUP}.")
+    package = GROUP if is_ours else module.__name__.partition(".")[0]
     return f"{getattr(found, '__module__', '')}.".startswith(f"{package}.")

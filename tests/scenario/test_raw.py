@@ -9,6 +9,7 @@ import pytest
 
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load
+from mjspace.simulation.assembly import assemble
 
 HEAD = 'base = "detumble-wheels"\n'
 
@@ -21,7 +22,7 @@ HEAD = 'base = "detumble-wheels"\n'
         ("seed = " + "9" * 5000, "a number has too many digits"),
         ("seed = " + "9" * 30, "seed: a whole number of more than 64 bits"),
         ('description = "a\\u001b[31m"', r"description: got 'a\\\\x1b\[31m': control characters"),
-        ('[sensors."a\\u0007"]\nmeasures = "rate"', "sensors .*: control characters in a key"),
+        ('[sensors."a\\u0007"]\nmeasures = "rate"', r"sensors: control characters in the key 'a"),
         ('description = "\\u202eabc"', "description: got .*: control characters"),
     ],
 )
@@ -43,11 +44,30 @@ def test_what_no_scenario_can_hold_is_refused(tmp_path: Path, text: str, message
         ("name=../x", "name: got '../x', should be a name that a folder can have"),
         ("name=/x", "name: got '/x', should be a name"),
         ("name='a\\b'", "should be a name"),
+        ("duration=1e10", "duration: got 1.*, should be less than or equal to 9000000000"),
+        ("duration=9e9", r"duration: 9000000000 s is more than 1e\+10 times rates\.control"),
+        ("rates.physics=1e-10", r"rates\.physics: got 1e-10 s, should be greater"),
+        ("law.rate_gain=1e-200", "got 1e-200: its size is not from 1e-100 to 1e100"),
+        ("plant.mass=1e200", r"got 1e\+200: its size is not from 1e-100 to 1e100"),
     ],
 )
 def test_what_no_key_can_be_set_to_is_refused(override: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         load("detumble-wheels", [override])
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("plant.model=../satellite_3rw/x", r"plant\.model: no model '\.\./satellite_3rw/x': have"),
+        ("plant.model=/etc", "plant.model: no model '/etc': have"),
+        ("plant.ground={part='../x'}", r"plant\.ground\.part: no part '\.\./x': have"),
+        ("sensors.rate={measures='rate',delay=1000}", "200000 times rates.control: at most 10000"),
+    ],
+)
+def test_what_no_vehicle_can_have_is_refused(override: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        assemble(*load("detumble-wheels", [override]))
 
 
 def test_a_long_value_is_shortened_in_the_message() -> None:
