@@ -4,6 +4,7 @@ from math import comb
 
 import numpy as np
 
+from mjspace.algebra import times
 from mjspace.contract import Array
 
 
@@ -15,7 +16,7 @@ def curve(points: Array, duration: float, s: Array) -> list[Array]:
     """
     found, corners = [], points
     for _ in range(5):
-        found.append(np.einsum("nk,kd->nd", bernstein(len(corners) - 1, s), corners))
+        found.append(times(corners.T, bernstein(len(corners) - 1, s)))
         corners = np.diff(corners, axis=0) * ((len(corners) - 1) / duration)
     return found
 

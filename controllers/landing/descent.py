@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mjspace import attitude as att
+from mjspace.algebra import dot, times
 from mjspace.contract import Array, Trajectory, gain
 
 from .lander_gains import LunarGravity
@@ -104,20 +105,20 @@ def powered(
     position, velocity, acceleration = motion[:3]
     thrust = _specific_force(motion, gravity_parameter, moon_radius)
     ahead, aside = np.cos(azimuth), np.sin(azimuth)
-    turned = np.array([[ahead, -aside, 0.0], [aside, ahead, 0.0], [0.0, 0.0, 1.0]])
-    f, df, ddf = (part @ turned for part in thrust)
+    to_plane = np.array([[ahead, aside, 0.0], [-aside, ahead, 0.0], [0.0, 0.0, 1.0]])
+    f, df, ddf = (times(to_plane, part) for part in thrust)
 
-    size = np.linalg.norm(f, axis=-1)
-    dsize = _dot(f, df) / size
-    ddsize = (_dot(df, df) + _dot(f, ddf) - dsize**2) / size
+    size = np.sqrt(dot(f, f))
+    dsize = dot(f, df) / size
+    ddsize = (dot(df, df) + dot(f, ddf) - dsize**2) / size
     # Q is not of unit length; the rate is 2 (Q* Q')_v / |Q|^2.
     Q, dQ, ddQ = (
-        np.stack([along + part[:, 2], -part[:, 1], part[:, 0], 0.0 * along], axis=-1)
+        np.concatenate([along + part[:, 2:], -part[:, 1:2], part[:, :1], 0.0 * along], axis=-1)
         for along, part in ((size, f), (dsize, df), (ddsize, ddf))
     )
-    square = _dot(Q, Q)[:, None]
+    square = dot(Q, Q)
     rate = 2.0 * att.multiply(att.conjugate(Q), dQ)[:, 1:] / square
-    growth = 2.0 * _dot(Q, dQ)[:, None] / square
+    growth = 2.0 * dot(Q, dQ) / square
     spin = 2.0 * att.multiply(att.conjugate(Q), ddQ)[:, 1:] / square - growth * rate
     yaw = att.from_rotation_vector(np.array([0.0, 0.0, azimuth]))
     attitude = att.multiply(yaw, att.normalize(Q))
@@ -131,15 +132,10 @@ def _specific_force(motion: list[Array], mu: float, radius: float) -> list[Array
     """
     position, velocity, acceleration, jerk, snap = motion
     p = position + np.array([0.0, 0.0, radius])
-    square = _dot(p, p)[:, None]
+    square = dot(p, p)
     pull = mu / (square * np.sqrt(square))
     return [
         acceleration + pull * p,
-        jerk + pull * (velocity - 3.0 * _dot(p, velocity)[:, None] / square * p),
-        snap + pull * (acceleration - 3.0 * _dot(p, acceleration)[:, None] / square * p),
+        jerk + pull * (velocity - 3.0 * dot(p, velocity) / square * p),
+        snap + pull * (acceleration - 3.0 * dot(p, acceleration) / square * p),
     ]
-
-
-def _dot(a: Array, b: Array) -> Array:
-    product: Array = np.einsum("ij,ij->i", a, b)
-    return product

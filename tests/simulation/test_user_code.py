@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mjspace.contract import Reference
 from mjspace.errors import FlightError, InputError
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
@@ -14,6 +15,7 @@ from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block
+from mjspace.simulation.user_code import reference_at
 
 HEAD = """
 from typing import NamedTuple
@@ -493,3 +495,19 @@ Law.first = first
     built = assemble(*load(scenario(tmp_path, code)))
     with pytest.raises(FlightError, match=r"the law's signals has the fields \['e'\] for one veh"):
         list(fly(built, first_start(built, range(2)), range(2)))
+
+
+def test_a_reference_is_asked_for_two_rows_at_least() -> None:
+    """Since one row of a matrix product may be rounded otherwise than several."""
+    asked = []
+
+    class Source:
+        def at(self, time: Any) -> Reference:
+            asked.append(list(time))
+            rows = np.zeros((len(time), 3))
+            return Reference(np.tile([1.0, 0.0, 0.0, 0.0], (len(time), 1)), rows, rows + time[0])
+
+    one = reference_at(Source(), np.array([0.5]))
+    assert asked == [[0.5, 0.5]]
+    assert one.attitude.shape == (1, 4)
+    assert one.acceleration.tolist() == [[0.5, 0.5, 0.5]]
