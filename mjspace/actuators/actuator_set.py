@@ -61,14 +61,17 @@ class ActuatorSet:
         burning = [_of(kind, kind.masses, before, after) for kind in self.kinds]
         return [(name, *change) for masses in burning for name, change in masses.items()]
 
-    def inputs(self, batch: Any) -> list[Array]:
-        """Return, of each kind, what it fills: a view of an input of the ``batch``.
+    def inputs(self, batch: Any) -> list[list[tuple[Array, slice]]]:
+        """Return, of each kind, the views of the ``batch``'s inputs that it fills, and with what.
 
-        Raises:
-            ValueError: motors that do not stand side by side in ``ctrl``.
+        That is part of the numbers that it applies: all of them, where its motors stand side by
+        side.
         """
-        driven = [kind.drives for kind in self.kinds]
-        return [batch.bind(each.array)[:, each.slice_of(batch.model)] for each in driven]
+        return [
+            [(batch.bind(kind.drives.array)[:, columns], part) for columns, part in runs]
+            for kind in self.kinds
+            for runs in [kind.drives.runs(batch.model)]
+        ]
 
     def reset(self, vehicles: int) -> State:
         """Return the state of all at the start."""

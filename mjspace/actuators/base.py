@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,23 +38,23 @@ class Input:
         """How many numbers are applied to one vehicle."""
         return len(self.motors) or len(self.columns)
 
-    def slice_of(self, model: Any) -> slice:
-        """Return its columns of the array of a vehicle of that ``model``.
+    def runs(self, model: Any) -> list[tuple[slice, slice]]:
+        """Return (columns of the array of a vehicle of that ``model``, numbers that go there).
 
-        Raises:
-            ValueError: motors that do not stand side by side and in order in ``ctrl``.
+        Motors that do not stand side by side in ``ctrl`` make several.
         """
         if not self.motors:
-            return slice(self.columns.start, self.columns.stop)
-        ids = [model.actuator(name).id for name in self.motors]
-        if ids != list(range(ids[0], ids[0] + len(ids))):
-            found = dict(zip(self.motors, ids, strict=True))
-            raise ValueError(f"motors must stand side by side and in order in ctrl: {found}")
-        return slice(ids[0], ids[-1] + 1)
+            return [(slice(self.columns.start, self.columns.stop), slice(0, len(self.columns)))]
+        ids = np.array([model.actuator(name).id for name in self.motors])
+        starts = [0, *(np.flatnonzero(np.diff(ids) != 1) + 1), len(ids)]
+        return [
+            (slice(int(ids[a]), int(ids[a]) + int(b - a)), slice(int(a), int(b)))
+            for a, b in pairwise(starts)
+        ]
 
 
 def motors(names: Iterable[str]) -> Input:
-    """Return the motors of these names in ``ctrl``, where they stand side by side."""
+    """Return the motors of these names in ``ctrl``."""
     return Input("ctrl", tuple(names))
 
 

@@ -18,16 +18,14 @@ from mjspace.actuators.base import (
     State,
     motors,
 )
+from mjspace.actuators.wheel_torques import motor_torques
 from mjspace.contract import Array, Measurement
-from mjspace.gufunc import gufunc
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import Meters3, Positive, Si, Unit3
 from mjspace.scenario.hinges import Bearing, Friction
 from mjspace.vehicle import mass_properties, model_checks, stability
-from mjspace.vehicle.composition import ASSETS
+from mjspace.vehicle.composition import ASSETS, bus_of
 
-MISSED = 1e-9, 1e-12
-"""Rounding where no wheel gives any torque: part of the commanded torque, and N m."""
 _GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
 
 
@@ -105,15 +103,8 @@ class Wheels(ActuatorTable, Bearing):
         inertia = stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[: len(self.axes)]]
         limits = self.torque_limit or inf, self.speed_limit or inf
         wheels = ReactionWheels(vehicle.wheel_axes, *limits, self.allocation, inertia)
-        if context.alone and len(wheels.unreachable):
-            about = " and ".join(str(np.round(axis, 6) + 0.0) for axis in wheels.unreachable)
-            warnings.warn(
-                f"plant.wheels.axes span {3 - len(wheels.unreachable)} of 3 directions: the wheels "
-                f"give no torque about {about}, body axes, and report one that is commanded there "
-                f"as saturation",
-                model_checks.ModelWarning,
-                stacklevel=2,
-            )
+        if context.alone:
+            wheels.warn_of_unreachable("plant.wheels.axes")
         return wheels
 
     def _attach_wheel(self, spec: Any, index: int, axis: Array) -> None:
@@ -126,7 +117,7 @@ class Wheels(ActuatorTable, Bearing):
             motor.ctrllimited = True
             motor.ctrlrange = [-self.torque_limit, self.torque_limit]
 
-        mount = spec.body("bus").add_frame()
+        mount = bus_of(spec).add_frame()
         mujoco.mju_quatZ2Vec(mount.quat, axis)
         if self.positions is not None:
             mount.pos = self.positions[index]
@@ -174,15 +165,15 @@ def _exit(half_size: Array, axis: Array) -> float:
 
 @dataclass(frozen=True)
 class ReactionWheels(Actuator):
-    """Wheels that are all alike, and share a torque by least norm or by least peak.
+    """Wheels that share a torque by least norm or by least peak.
 
     Friction is not compensated: what the bearings take is the law's to find out.
     """
 
     axes: Array
     """Unit spin axes in body axes, shape (n, 3)."""
-    torque_limit: float = inf
-    """Largest motor torque [N m]."""
+    torque_limit: Array | float = inf
+    """Largest motor torque [N m], of all or of each, shape (n,)."""
     speed_limit: float = inf
     """Largest speed relative to the bus [rad/s]."""
     shared_by: Literal["least_squares", "least_peak"] = "least_squares"
@@ -190,6 +181,8 @@ class ReactionWheels(Actuator):
     inertia: Array = field(default_factory=lambda: np.zeros(0))
     """Of each rotor against the bus, motor torque over relative acceleration [kg m^2], shape (n,);
     used by the speed limit alone."""
+    names: tuple[str, ...] = ()
+    """Of their motors; ``wheel_0``, ... when left out."""
     logged_as: ClassVar[str] = "wheel_torque"
     unit: ClassVar[str] = "N m"
     takes: ClassVar[Fields] = {"torque": (3, "N m")}
@@ -199,7 +192,7 @@ class ReactionWheels(Actuator):
     """Motor torques whose sum on the bus is zero, to be added, shape (n,); zero for least norm."""
     unreachable: Array = field(init=False, repr=False)
     """Unit vectors, body axes, about which no wheel gives any torque, shape (3 - rank, 3)."""
-    _limits: Array = field(init=False, repr=False)
+    _torque_limits: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if np.isfinite(self.speed_limit) and len(self.inertia) != len(self.axes):
@@ -212,7 +205,8 @@ class ReactionWheels(Actuator):
             "spare": self._spare(),
             "unreachable": self._unreachable(),
             "inertia": self.inertia if len(self.inertia) else np.ones(len(self.axes)),
-            "_limits": np.array([self.torque_limit, self.speed_limit]),
+            "names": self.names or _names(len(self.axes)),
+            "_torque_limits": np.broadcast_to(self.torque_limit, len(self.axes)).astype(float),
         }
         for name, value in derived.items():
             object.__setattr__(self, name, value)
@@ -225,12 +219,14 @@ class ReactionWheels(Actuator):
     @property
     def drives(self) -> Input:
         """Their motors."""
-        return motors(_names(len(self.axes)))
+        return motors(self.names)
 
     def limits(self) -> dict[str, tuple[Array, Array]]:
         """Return the torque that the wheels together apply about each axis."""
-        reach = np.abs(self.axes).sum(axis=0)
-        largest = np.multiply(reach, self.torque_limit, out=np.zeros(3), where=reach > 0.0)
+        shares = np.abs(self.axes)
+        limits = np.broadcast_to(self._torque_limits[:, None], shares.shape)
+        largest = np.multiply(shares, limits, out=np.zeros_like(shares), where=shares > 0.0)
+        largest = largest.sum(axis=0)
         return {"torque": (-largest, largest)}
 
     def act(
@@ -250,18 +246,34 @@ class ReactionWheels(Actuator):
         ``saturated`` is 1.0 for a wheel whose torque is limited, else 0.0; and 1.0 for every
         wheel where ``torque`` has a part that none of them can apply.
         """
-        # Past Numba's wrapper, and with both limits in one array: 1.6 us a call, not 2.6.
-        applied: tuple[Array, Array] = _motor_torque.ufunc(
+        applied: tuple[Array, Array] = motor_torques.ufunc(
             torque,
             wheel_speed,
             self.allocation,
             self.spare,
-            self._limits,
+            self._torque_limits,
+            self.speed_limit,
             self.inertia,
             self.unreachable,
             step,
         )
         return applied
+
+    def warn_of_unreachable(self, key: str) -> None:
+        """Warn where there are axes about which the wheels, which alone act, give no torque.
+
+        Warns:
+            ModelWarning: with the axes; ``key`` is what the scenario calls the wheels'.
+        """
+        if not len(self.unreachable):
+            return
+        about = " and ".join(str(np.round(axis, 6) + 0.0) for axis in self.unreachable)
+        warnings.warn(
+            f"{key} span {3 - len(self.unreachable)} of 3 directions: the wheels give no torque "
+            f"about {about}, body axes, and report one that is commanded there as saturation",
+            model_checks.ModelWarning,
+            stacklevel=3,
+        )
 
     def _unreachable(self) -> Array:
         """Return ``unreachable``; none for a vehicle without wheels, on which nothing relies."""
@@ -286,62 +298,3 @@ class ReactionWheels(Actuator):
             )
         one: Array = right[-1]
         return np.where(np.abs(one) < 1e-12, 0.0, one)
-
-
-# Products are written out: BLAS may round one vehicle's differently in a batch than alone.
-@gufunc(
-    ["void(f8[:], f8[:], f8[:, :], f8[:], f8[:], f8[:], f8[:, :], f8, f8[:], f8[:])"],
-    "(k),(n),(n,k),(n),(m),(n),(u,k),()->(n),(n)",
-)
-def _motor_torque(
-    torque: Any,
-    speed: Any,
-    allocation: Any,
-    spare: Any,
-    limits: Any,
-    inertia: Any,
-    unreachable: Any,
-    step: Any,
-    ctrl: Any,
-    saturated: Any,
-) -> None:
-    torque_limit, speed_limit = limits[0], limits[1]
-    best, least = 0.0, 0.0
-    for i in range(speed.size):
-        desired = 0.0
-        for k in range(torque.size):
-            desired += allocation[i, k] * torque[k]
-        ctrl[i] = desired
-        least = max(least, abs(desired))
-    # The largest of |ctrl + t spare| is least where two wheels are level: all t of such pairs are
-    # tried, and none, which stays where it is as good.
-    for i in range(speed.size):
-        for j in range(i):
-            for sign in (-1.0, 1.0):
-                slope = spare[i] + sign * spare[j]
-                if slope != 0.0:
-                    t, peak = -(ctrl[i] + sign * ctrl[j]) / slope, 0.0
-                    for k in range(speed.size):
-                        peak = max(peak, abs(ctrl[k] + t * spare[k]))
-                    if peak < least:
-                        best, least = t, peak
-    missed, largest = 0.0, 0.0
-    for k in range(torque.size):
-        largest = max(largest, abs(torque[k]))
-    for u in range(unreachable.shape[0]):
-        part = 0.0
-        for k in range(torque.size):
-            part += unreachable[u, k] * torque[k]
-        missed = max(missed, abs(part))
-    beyond = missed > max(MISSED[0] * largest, MISSED[1])
-    for i in range(speed.size):
-        desired = ctrl[i] + best * spare[i]
-        applied = desired
-        if abs(applied) > torque_limit:
-            applied = np.copysign(torque_limit, desired)
-        if speed_limit < np.inf:
-            most = max(speed_limit - speed[i], 0.0) * inertia[i] / step
-            least = min(-speed_limit - speed[i], 0.0) * inertia[i] / step
-            applied = least if applied < least else most if applied > most else applied
-        ctrl[i] = applied
-        saturated[i] = 1.0 if applied != desired or beyond else 0.0

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.vehicle.composition import bus_of
 
 DRY = 1e-6
 """kg left in a tank that is empty: a body without mass would have no inertia."""
@@ -12,7 +13,7 @@ DRY = 1e-6
 
 def add_sphere(spec: Any, name: str, mass: float, radius: float) -> None:
     """Add a full spherical tank of ``mass`` [kg] and ``radius`` [m] at the body origin."""
-    tank = spec.body("bus").add_body(name=name, mass=mass, explicitinertial=True)
+    tank = bus_of(spec).add_body(name=name, mass=mass, explicitinertial=True)
     tank.inertia = np.full(3, 0.4 * mass * radius**2)
 
 

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from mjspace.actuators.base import ActuatorTable
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import Meters3, Positive, Si, Table, Time, Unit3
+from mjspace.vehicle.composition import bus_of
 from mjspace.vehicle.vehicle import Vehicle
 
 _HIDDEN = 5  # a group of sites that no picture shows
@@ -75,7 +76,7 @@ def names(count: int) -> tuple[str, ...]:
 
 def _attach_thruster(spec: Any, name: str, place: list[float], way: list[float]) -> None:
     """Let a thruster push on the bus at its place; its plume is hidden until a picture shows it."""
-    bus = spec.body("bus")
+    bus = bus_of(spec)
     bus.add_site(name=name, pos=place, group=_HIDDEN)
     site = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": name}
     spec.add_actuator(name=name, gear=[*way, 0.0, 0.0, 0.0], **site)

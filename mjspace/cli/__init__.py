@@ -11,7 +11,7 @@ import warnings
 
 import typer
 
-from mjspace.cli import flights, pictures, recovery, scenarios, validation
+from mjspace.cli import flights, models, pictures, recovery, scenarios, validation
 from mjspace.errors import print_warning
 from mjspace.rendering import graphics
 from mjspace.terminal.reporting import report_errors
@@ -25,6 +25,8 @@ app = typer.Typer(
 )
 app.command("list")(scenarios.list_scenarios)
 app.command()(scenarios.info)
+app.command()(models.inspect)
+app.command()(models.new)
 app.command()(flights.run)
 app.command()(flights.replay)
 app.command()(pictures.render)

@@ -10,11 +10,11 @@ _PLOTS = {
 }
 
 
-def layout() -> bytes:
-    """Return the layout as Foxglove and Lichtblick import it."""
+def layout(bus: str) -> bytes:
+    """Return the layout as Foxglove and Lichtblick import it; the view follows the body ``bus``."""
     configs: dict[str, object] = {
         "3D!scene": {
-            "followTf": "bus",
+            "followTf": bus,
             "followMode": "follow-position",
             "topics": {"/scene": {"visible": True}},
         }

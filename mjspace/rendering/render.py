@@ -12,7 +12,7 @@ from PIL import Image
 from mjspace.contract import Array
 from mjspace.environment.install import userdata_size
 from mjspace.errors import whole_or_none
-from mjspace.log.flown_scenario import scenario_of
+from mjspace.log.flown_scenario import model_of, scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering import overlay
 from mjspace.rendering.offscreen import Canvas
@@ -138,7 +138,8 @@ def _model(log: Log, scenario: Scenario) -> Any:
     """Return the model that flew in the log."""
     size = userdata_size(scenario.environment, scenario.plant)
     with warnings.catch_warnings(action="ignore"):  # it was said when it flew
-        here = build(scenario.plant, scenario.rates, userdata=size).model
+        source = model_of(log, scenario)
+        here = build(scenario.plant, scenario.rates, userdata=size, source=source).model
     packed = log.attachment("model.mjb.gz")
     return logged_model(here, packed, log.metadata, log.shape("/state", "physics"))
 

@@ -9,6 +9,7 @@ from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.environment.orbit import Orbit, orbit_position
 from mjspace.rendering.plume import Plume
+from mjspace.vehicle.indices import bus_id
 
 _GEOM = mujoco.mjtObj.mjOBJ_GEOM
 AXES = 3
@@ -85,7 +86,7 @@ class Stage:
         self._plume.lift_shadow(self.scene)
         for geom in self._axes:
             self._add_desired(geom, desired)
-        bus: Array = data.body("bus").xquat.copy()
+        bus: Array = data.xquat[bus_id(model)].copy()
         return bus
 
     def _turn_rotors(self) -> None:

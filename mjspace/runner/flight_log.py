@@ -17,6 +17,7 @@ from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.recording import Block, one_vehicle, shapes
 from mjspace.units import Unit
 from mjspace.vehicle import vehicle
+from mjspace.vehicle.indices import bus_id
 
 _described: dict[bytes, tuple[bytes, Scene]] = {}
 """Of the last model, 10 MB."""
@@ -52,11 +53,12 @@ class FlightLog:
         self._first = first.period
         self._last_frame: tuple[np.ndarray, np.ndarray] | None = None
         """Time (1,) [s] and state (1, nstate) of the last period, unless its frames are logged."""
+        bus = self._model.body(bus_id(self._model)).name
         compiled, drawn = described(self._model)
         attachments = {
             "model.mjb.gz": ("application/gzip", compiled),
             "scenario.toml": ("application/toml", to_toml(scenario).encode()),
-            "foxglove_layout.json": ("application/json", foxglove_layout.layout()),
+            "foxglove_layout.json": ("application/json", foxglove_layout.layout(bus)),
         }
         for name, content in assembly.sources.items():
             is_code = name.endswith(".py")

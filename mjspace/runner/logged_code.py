@@ -1,9 +1,10 @@
-"""The user's code that a log holds: what of it would run again, and where it is unpacked."""
+"""The user's files that a log holds: what of them would run again, and where they are unpacked."""
 
 import hashlib
 from pathlib import Path
 
 from mjspace.errors import InputError
+from mjspace.log.flown_scenario import model_of
 from mjspace.log.reader import Log
 from mjspace.scenario.scenario import Scenario
 
@@ -24,6 +25,19 @@ def code_of(log: Log, scenario: Scenario, *, law: bool = True) -> dict[str, byte
     folders = tuple(place.partition("/")[0] + "/" for place in files if "/" in place)
     names = [name for name in log.attachments if name in files or name.startswith(folders)]
     return {name: log.attachment(name) for name in names}
+
+
+def model_files(log: Log, scenario: Scenario) -> dict[str, bytes]:
+    """Return the files of a user's own model in the log, by name: data, which nothing runs.
+
+    Raises:
+        ValueError: one of them is missing or damaged.
+    """
+    source = model_of(log, scenario)
+    if source is None:
+        return {}
+    folder, _, _ = source.name.rpartition("/")
+    return {f"{folder}/{name}": content for name, content in source.files.items()}
 
 
 def require_trust(files: dict[str, bytes]) -> None:

@@ -20,7 +20,7 @@ from mjspace.log.reader import Log
 from mjspace.log.rows import due
 from mjspace.log.writer import nanoseconds
 from mjspace.runner.former_names import as_logged, logged_name
-from mjspace.runner.logged_code import code_of, require_trust, unpack
+from mjspace.runner.logged_code import code_of, model_files, require_trust, unpack
 from mjspace.runner.output import LOG, refuse_existing
 from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.loading import component
@@ -181,19 +181,20 @@ def assembly_of(
         scenario = _without_signals_of_the_law(scenario).model_copy(update={"law": law})
     with input_error_at("log"):
         code = code_of(log, scenario, law=law is None)
+        model = model_files(log, scenario)
     if not trust:
         require_trust(code)
     with tempfile.TemporaryDirectory() as own:
-        unpack(code, Path(own))
+        unpack(code | model, Path(own))
         law_folder = None if law is None else folder
         assembly = assemble(scenario, Path(own), trust=trust, law_folder=law_folder)
-        model = logged_model(
+        flown = logged_model(
             assembly.vehicle.model,
             log.attachment("model.mjb.gz"),
             log.metadata,
             log.shape("/state", "physics"),
         )
-        yield dataclasses.replace(assembly, vehicle=vehicle.on_model(assembly.vehicle, model))
+        yield dataclasses.replace(assembly, vehicle=vehicle.on_model(assembly.vehicle, flown))
 
 
 def _without_signals_of_the_law(scenario: Scenario) -> Scenario:

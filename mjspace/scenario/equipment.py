@@ -12,7 +12,7 @@ class Driven:
     """What an actuator drives in the compiled model, by name."""
 
     motors: tuple[str, ...] = ()
-    """MuJoCo's actuators that it commands, side by side in ``ctrl`` and in that order."""
+    """MuJoCo's actuators that it commands, in the order of what it applies."""
     gimbals: tuple[str, ...] = ()
     """Hinges whose angles and rates are those of gimbals, the outer before the inner."""
     wheels: tuple[str, ...] = ()

@@ -4,11 +4,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from mjspace.errors import shortened
+from mjspace.scenario import model_source
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.equipment import Equipment
 from mjspace.scenario.fields import (
     Angles3,
     Finite,
+    KindName,
     Matrix3,
     Meters3,
     Momentum3,
@@ -45,6 +48,10 @@ class Rates(Table):
 _WHEELS = DeclaredIn("mjspace.actuators.reaction_wheels:Wheels", optional=False)
 
 
+_INERTIAS = ("bus_inertia", "gyrostat_inertia", "vehicle_inertia")
+_STATED_BY_THE_MODEL = ("mass", "vehicle_mass", *_INERTIAS)
+
+
 class Part(Table):
     """Something bolted to the bus that moves of itself: a nutation damper, a boom, a yo-yo."""
 
@@ -64,13 +71,35 @@ class Part(Table):
         return self
 
 
+class Roles(Table):
+    """What parts of a model of one's own are, where their kinds do not say it.
+
+    Patterns are a shell's, as ``"rw_*"``, for names of motors or of the joints or sites that they
+    act on.
+    """
+
+    bus: str | None = None
+    """Body that is the bus, and is freed where the model fixes it to the world; that with the free
+    joint when left out."""
+    wheels: list[str] | None = None
+    """Torque motors of hinges that are reaction wheels, or hinges without one, as all of a URDF,
+    which then get it; when left out, those of unlimited hinges on
+    the bus that turn a balanced body. None: ``[]``."""
+    thrusters: list[str] | None = None
+    """Forces at sites that are thrusters; all of them when left out."""
+
+
 class PlantTable(Table):
     """The vehicle: an assembly from assets/, with its mass properties, parts and actuators."""
 
-    model: str = "satellite_3rw"
-    """Name of a folder in assets/."""
-    mass: Annotated[Positive, Si("kg")] = 100.0
-    """Mass of the bus alone."""
+    model: KindName = "satellite_3rw"
+    """Name of a folder in assets/; or a model of one's own, a file in the scenario's folder: MJCF
+    (.xml), URDF (.urdf), or ``"file.py:function"`` that returns an ``mujoco.MjSpec``. Such a model
+    has its own mass properties, and no wheels but its own and those of ``[plant.wheels]``."""
+    roles: Roles = Roles()
+    """Of a model of one's own."""
+    mass: Annotated[Positive, Si("kg")] | None = 100.0
+    """Mass of the bus alone; a model of one's own has its own."""
     bus_inertia: Matrix3 | None = None
     """Inertia of the bus alone about its centre of mass, body axes; any symmetric positive-definite
     matrix. The asset's own when neither this nor ``gyrostat_inertia`` is given."""
@@ -121,14 +150,31 @@ class PlantTable(Table):
     ``dipole``."""
 
     @property
+    def is_own(self) -> bool:
+        """Whether the model is the user's."""
+        return model_source.is_own(self.model)
+
+    @property
     def equipment(self) -> dict[str, Any]:
         """The tables of all that is fitted, by key, in the order of the keys.
 
-        A vehicle without anything else has reaction wheels, of which there may be none.
+        A vehicle from assets/ without anything else has reaction wheels, if only none of them.
         """
         tables = {name: getattr(self, name) for name in type(self).model_fields}
         fitted = {n: t for n, t in tables.items() if isinstance(t, Equipment) and t.fitted}
-        return fitted or {"wheels": self.wheels}
+        return fitted if fitted or self.is_own else {"wheels": self.wheels}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_own_model(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or not isinstance(name := table.get("model"), str):
+            return table
+        if not model_source.is_own(name):
+            return table
+        for key in _STATED_BY_THE_MODEL:
+            if table.get(key) is not None:
+                raise ValueError(f"{key}: the model {shortened(name)} states it")
+        return {"wheels": {"axes": []}, **table, "mass": None}
 
     @model_validator(mode="after")
     def _beside_each_other(self) -> "PlantTable":
@@ -141,8 +187,7 @@ class PlantTable(Table):
 
     @model_validator(mode="after")
     def _one_inertia(self) -> "PlantTable":
-        names = ("bus_inertia", "gyrostat_inertia", "vehicle_inertia")
-        given = [name for name in names if getattr(self, name) is not None]
+        given = [name for name in _INERTIAS if getattr(self, name) is not None]
         if len(given) > 1:
             raise ValueError(f"{given[0]} and {given[1]} are both given: give one")
         if (self.vehicle_mass is None) != (self.vehicle_inertia is None):

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjspace.actuators import faults
+from mjspace.actuators import faults, model_motors
 from mjspace.actuators.actuator_set import ActuatorSet
-from mjspace.actuators.base import Actuator, Context
+from mjspace.actuators.base import Context
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.environment.install import userdata, userdata_size
@@ -23,7 +23,7 @@ from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import Surroundings
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
-from mjspace.vehicle import deployments, ground_contact
+from mjspace.vehicle import deployments, ground_contact, own_model
 from mjspace.vehicle.vehicle import Vehicle, build, initial_state
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ METHODS = {
     "reference": ("at(time)",),
 }
 """What a component must have."""
+MODEL = "model"
+"""The folder of a user's own model in a log."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +136,18 @@ def assemble(
     Raises:
         InputError: a part cannot be built, with the scenario's key and what would be right.
     """
+    own = Trust(folder, everything=trust)
+    sources: dict[str, bytes] = {}
+    flown: dict[str, Any] = {}
+    model = None
+    if scenario.plant.is_own:
+        model = _part("plant.model", own_model.open_source, scenario.plant.model, own)
+        sources |= {f"{MODEL}/{name}": content for name, content in model.files.items()}
+        flown["plant"] = scenario.plant.model_copy(update={"model": f"{MODEL}/{model.main}"})
     size = userdata_size(scenario.environment, scenario.plant)
-    vehicle = _part("plant", partial(build, userdata=size), scenario.plant, scenario.rates)
+    vehicle = _part(
+        "plant", partial(build, userdata=size, source=model), scenario.plant, scenario.rates
+    )
     facts = {
         "inertia": vehicle.inertia,
         "wheel_axes": vehicle.wheel_axes,
@@ -145,9 +157,7 @@ def assemble(
     }
     for table in scenario.plant.equipment.values():
         facts |= table.facts(vehicle)
-    flown: dict[str, Any] = {}
-    sources: dict[str, bytes] = {}
-    own = Trust(folder, everything=trust)
+    facts |= model_motors.facts_of(vehicle)
     of_law = own if law_folder is None else Trust(law_folder, everything=True)
     law, flown["law"] = _component("law", scenario.law, facts, of_law, sources)
     reference, flown["reference"] = _component("reference", scenario.reference, facts, own, sources)
@@ -228,9 +238,13 @@ def _in_log(role: str, kind: str, found: Any, sources: dict[str, bytes]) -> str:
 
 
 def _actuators(vehicle: Vehicle, scenario: Scenario, *, inner: bool) -> ActuatorSet:
-    """Return the actuators of all that is fitted to the vehicle, in the order of plant's keys."""
-    tables, kinds = scenario.plant.equipment, tuple[Actuator, ...]()
-    gravity, alone = _gravity_at_start(scenario), len(tables) == 1
+    """Return the actuators of all that is fitted to the vehicle, in the order of plant's keys.
+
+    Those of a model of one's own come before.
+    """
+    tables, gravity = scenario.plant.equipment, _gravity_at_start(scenario)
+    kinds = model_motors.actuators_of(vehicle, alone=not any(t.fitted for t in tables.values()))
+    alone = len(tables) == 1 and not kinds
     for key, table in tables.items():
         with input_error_at(f"plant.{key}"):
             driven = table.driven(vehicle.model)

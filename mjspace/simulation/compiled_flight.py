@@ -229,8 +229,9 @@ class CompiledFlight:
         orders["prepared"] = any(effect.every_step for effect in self._effects)
         orders["control"], orders["physics"] = rates.control, rates.physics
         applied = [
-            Write(kind.drives.array, kind.drives.slice_of(model).start, values)
+            Write(kind.drives.array, columns.start, values[:, part])
             for kind, values in zip(assembly.actuators.kinds, period.applied, strict=True)
+            for columns, part in kind.drives.runs(model)
         ]
         tables = {
             "memory": period.program.memory.view(np.int64),

@@ -20,6 +20,7 @@ from mjspace.simulation.initial_state import Start
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 from mjspace.simulation.user_code import sealed
+from mjspace.vehicle.indices import bus_id
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 InnerLoop = Callable[[float, Any, Measurement], Any]
@@ -54,7 +55,7 @@ class Stepper:
         if start.model:
             self.batch.set_const()
         self._sensordata = self.batch.bind("sensordata")
-        bus = assembly.vehicle.model.body("bus").id
+        bus = bus_id(assembly.vehicle.model)
         self._on_bus = self.batch.bind("xfrc_applied")[:, bus]  # force and torque, inertial axes
         self.layout = StateLayout(assembly)
         self._suite, self.sensors = assembly.sensors(members), start.sensors
@@ -224,8 +225,9 @@ class Stepper:
         for effect in self._hooks["change"]:
             memory, applied = _of(effect, effect.change, memory, applied, instant)
         self.memory = memory
-        for view, values in zip(self._inputs, applied, strict=True):
-            view[:] = values
+        for views, values in zip(self._inputs, applied, strict=True):
+            for view, part in views:
+                view[:] = values[:, part]
         return applied, saturated
 
     def _each_effect(self, hook: str, *arguments: Any, between: bool = False) -> None:

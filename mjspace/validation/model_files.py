@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.vehicle.own_model import one_line
 
 KINDS = (".xml", ".urdf", ".mjb")
 _AUTO = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
@@ -58,18 +59,13 @@ def read(path: Path) -> Source:
         # FatalError is MuJoCo's for errors that it cannot continue from
         except (ValueError, mujoco.FatalError) as error:
             raise ValueError(_refusal(path, error)) from error
-    return Source(model, spec, [_line(str(warning.message)) for warning in caught])
+    return Source(model, spec, [one_line(str(warning.message)) for warning in caught])
 
 
 def _refusal(path: Path, error: Exception) -> str:
     if path.suffix == ".mjb":
-        return f"no compiled model of MuJoCo {mujoco.__version__}: {_line(str(error))}"
-    return _line(str(error))
-
-
-def _line(text: str) -> str:
-    """Return MuJoCo's message in one line."""
-    return ", ".join(line.strip(" :,") for line in text.splitlines() if line.strip(" :,"))
+        return f"no compiled model of MuJoCo {mujoco.__version__}: {one_line(str(error))}"
+    return one_line(str(error))
 
 
 def findings(spec: Any) -> Iterator[str]:

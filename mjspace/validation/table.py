@@ -20,7 +20,7 @@ def show(results: Results) -> None:
 
     A narrow terminal omits the reasons of the bounds; the report has them.
     """
-    console = _console()
+    console = console_of_terminal()
     console.print(_quantities(results, reasons=console.width >= _WIDE))
     if not results.quick:
         console.print()
@@ -37,7 +37,7 @@ def show(results: Results) -> None:
 
 def show_passport(passport: Passport) -> None:
     """Print what the guards say of the model, what was measured of it, and which step it needs."""
-    console = _console()
+    console = console_of_terminal()
     say = partial(console.print, highlight=False, soft_wrap=True)
     say(
         f"{passport.model}: {passport.integrator}, step {passport.step:g} s",
@@ -46,7 +46,7 @@ def show_passport(passport: Passport) -> None:
     for finding in passport.findings:
         word = "[bold red]refused[/]" if finding.refused else "[yellow]warning[/]"
         say(f"{word}: {escape(finding.text)}")
-    table = _table("quantity", "measured", "allowed", "verdict", "why that bound")
+    table = table_of("quantity", "measured", "allowed", "verdict", "why that bound")
     for row in passport.rows:
         table.add_row(
             row.quantity,
@@ -62,7 +62,7 @@ def show_passport(passport: Passport) -> None:
         say(advice, markup=False)
 
 
-def _console() -> Console:
+def console_of_terminal() -> Console:
     """Return the terminal; where there is none, one wide enough for the reasons."""
     console = Console()
     return console if console.is_terminal else Console(width=_WIDE)
@@ -71,7 +71,7 @@ def _console() -> Console:
 def _quantities(results: Results, *, reasons: bool) -> Table:
     others = () if results.quick else wording.OTHERS
     why = ("why that bound",) if reasons else ()
-    table = _table("benchmark", "quantity", "measured", "allowed", "verdict", *others, *why)
+    table = table_of("benchmark", "quantity", "measured", "allowed", "verdict", *others, *why)
     for section in results.sections:
         for row in section.rows:
             table.add_row(
@@ -87,7 +87,7 @@ def _quantities(results: Results, *, reasons: bool) -> Table:
 
 
 def _matrix(results: Results) -> Table:
-    table = _table("caught faults", *FAULTS)
+    table = table_of("caught faults", *FAULTS)
     for section in (section for section in results.sections if section.faults):
         marks = {injected.fault: injected for injected in section.faults}
         table.add_row(
@@ -106,7 +106,8 @@ def _matrix(results: Results) -> Table:
     return table
 
 
-def _table(*columns: str) -> Table:
+def table_of(*columns: str) -> Table:
+    """Return a table without lines; measured values are to the right, reasons dim."""
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in columns:
         if name == "measured" or name in wording.OTHERS:

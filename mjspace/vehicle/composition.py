@@ -1,30 +1,61 @@
 """A vehicle's ``MjSpec``, composed from assets/: its model, its equipment, its parts."""
 
+import warnings
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
 from mjspace.errors import input_error_at, nearest
 from mjspace.scenario.hinges import Hinge
+from mjspace.scenario.model_source import ModelSource
 from mjspace.scenario.plant import Part, PlantTable
-from mjspace.vehicle import deployments, mass_properties
+from mjspace.vehicle import deployments, mass_properties, own_model
+from mjspace.vehicle.indices import ENVIRONMENT, KINETIC, MOMENTUM
+from mjspace.vehicle.roles import Recognized
 
 ASSETS = Path(str(files("mjspace.assets")))
 """The folder of the models and their parts."""
+_CAMERA = "chase"
+_VIEW = np.array([3.0, -1.5, 0.95])
+"""From the bus to the camera, in extents of the vehicle."""
+_LOOK = {
+    "map": ("znear", "zfar"),
+    "headlight": ("ambient", "diffuse", "specular"),
+    "global_": ("offwidth", "offheight"),
+}
+"""What the surroundings need of MuJoCo's visual settings."""
 _STOP_SPRING = [0.005, 1.0]  # s, damping ratio: of what turns there, whatever its inertia
 _STOP_HARDNESS = [0.95, 0.99, 0.001, 0.5, 2.0]  # MuJoCo's solimp
 
 
-def compose(table: PlantTable) -> Any:
-    """Return the vehicle's ``MjSpec``: the model with its equipment, parts and ground.
+class Composed(NamedTuple):
+    """A vehicle before it is compiled."""
+
+    spec: Any
+    """Its ``MjSpec``: the model with equipment, parts and ground."""
+    own: Recognized
+    """What the motors of the model itself are."""
+
+
+def compose(table: PlantTable, source: ModelSource | None = None) -> Composed:
+    """Return the vehicle of a ``table``; of a user's own model from its ``source``.
 
     Raises:
-        ValueError: an unknown model, part or hinge; equipment that cannot be attached.
+        ValueError: an unknown model, part or hinge; equipment that cannot be attached; a model of
+            one's own that cannot fly.
     """
-    spec = _load(table.model)
+    if source is None:
+        spec, own = _load(table.model), Recognized()
+    else:
+        with input_error_at(f"plant.model: {source.name}"):
+            spec = own_model.read(source)
+        with input_error_at("plant"):
+            own, bare = own_model.prepare(spec, table.roles, lands=table.ground is not None)
+        _add_surroundings(spec, bare)
+    _add_sensors(spec)
     of_model = _joint_names(spec)
     _attach_equipment(spec, table, before_parts=True)
     of_equipment = _joint_names(spec) - of_model
@@ -44,7 +75,13 @@ def compose(table: PlantTable) -> Any:
     if spec.equalities or stops:
         # A model of free bodies needs no constraints; a cord that unwinds and a gimbal's stop do.
         spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    return spec
+    return Composed(spec, own)
+
+
+def bus_of(spec: Any) -> Any:
+    """Return the body of the vehicle's ``MjSpec`` that the free joint moves."""
+    free = (joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE)
+    return next(free).parent
 
 
 def part_names() -> list[str]:
@@ -61,13 +98,49 @@ def _load(name: str) -> Any:
     return mujoco.MjSpec.from_file(str(known[name]))
 
 
+def _add_sensors(spec: Any) -> None:
+    """Add what the log has of the whole vehicle."""
+    bus, kind = bus_of(spec).name, mujoco.mjtSensor
+    body = mujoco.mjtObj.mjOBJ_BODY
+    spec.add_sensor(name=MOMENTUM, type=kind.mjSENS_SUBTREEANGMOM, objtype=body, objname=bus)
+    spec.add_sensor(name=KINETIC, type=kind.mjSENS_E_KINETIC)
+    spec.add_sensor(
+        name=ENVIRONMENT, type=kind.mjSENS_USER, dim=6, needstage=mujoco.mjtStage.mjSTAGE_VEL
+    )
+
+
+def _add_surroundings(spec: Any, model: Any) -> None:
+    """Add a camera to a user's model, which compiles to ``model``, and stars, sun and planet."""
+    if spec.camera(_CAMERA) is None:
+        place = _VIEW * max(float(model.stat.extent), 1e-3)
+        backwards = place / np.linalg.norm(place)
+        right = np.cross([0.0, 0.0, 1.0], backwards)
+        right /= np.linalg.norm(right)
+        camera = bus_of(spec).add_camera(name=_CAMERA, pos=place, fovy=40.0)
+        camera.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACK
+        axes = np.stack([right, np.cross(backwards, right), backwards], axis=-1)
+        mujoco.mju_mat2Quat(camera.quat, axes.ravel())
+    if any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
+        return
+    scenery = mujoco.MjSpec.from_file(str(ASSETS / "scenery/space.xml"))
+    spec.stat.extent, spec.stat.center = scenery.stat.extent, scenery.stat.center
+    for group, names in _LOOK.items():
+        for name in names:
+            value = getattr(getattr(scenery.visual, group), name)
+            setattr(getattr(spec.visual, group), name, value)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of its files, which are found where they are
+        spec.attach(scenery, prefix="space_", frame=spec.worldbody.add_frame())
+    spec.geom("space_planet").name = "planet"
+
+
 def _attach_part(spec: Any, name: str, part: Part) -> None:
     if part.part not in part_names():
         raise ValueError(
             f"plant.parts.{name}.part: no part {part.part!r}: have {', '.join(part_names())}"
         )
     child = mujoco.MjSpec.from_file(str(ASSETS / f"parts/{part.part}/{part.part}.xml"))
-    mount = spec.body("bus").add_frame(pos=part.position)
+    mount = bus_of(spec).add_frame(pos=part.position)
     mujoco.mju_euler2Quat(mount.quat, np.array(part.euler), "XYZ")  # about fixed axes
     deployments.prepare(child, part)
     spec.attach(child, prefix=f"{name}_", frame=mount)

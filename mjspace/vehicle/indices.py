@@ -9,6 +9,9 @@ import numpy as np
 from mjspace.scenario.equipment import Driven
 from mjspace.vehicle import stability
 
+MOMENTUM, KINETIC, ENVIRONMENT = "momentum", "kinetic", "environment"
+"""Sensors of the whole vehicle; that of the environment is the environment's own."""
+
 
 def of(model: Any, driven: Driven) -> dict[str, Any]:
     """Return the fields of ``Vehicle`` that tell where things are in ``model``.
@@ -22,8 +25,13 @@ def of(model: Any, driven: Driven) -> dict[str, Any]:
         "gimbal_dof": _where(model.joint(name).dofadr for name in driven.gimbals),
         "gimbal_qpos": _where(model.joint(name).qposadr for name in driven.gimbals),
         "strut_qpos": _where(joint.qposadr for joint in _struts(model)),
-        **{name: _sensor(model, name) for name in ("momentum", "kinetic", "environment")},
+        **{name: _sensor(model, name) for name in (MOMENTUM, KINETIC, ENVIRONMENT)},
     }
+
+
+def bus_id(model: Any) -> int:
+    """Return the body that the vehicle's free joint moves, which is the model's first joint."""
+    return int(model.jnt_bodyid[0])
 
 
 def turned(model: Any) -> list[str]:
@@ -37,7 +45,7 @@ def axes(model: Any, dofs: Any) -> Any:
     """Return the hinges' unit axes with all joints at rest, body axes, shape (n, 3)."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    bus = data.xmat[model.body("bus").id].reshape(3, 3)
+    bus = data.xmat[bus_id(model)].reshape(3, 3)
     return data.xaxis[model.dof_jntid[dofs]] @ bus
 
 

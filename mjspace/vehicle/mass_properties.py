@@ -1,6 +1,6 @@
 """Mass properties: a rotor's, and those of the bus from the vehicle's less its wheels'."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,11 +92,10 @@ def bus(table: PlantTable, wheels: Rotors, own: Array) -> tuple[Inertial, Array]
     Raises:
         ValueError: the wheels have more inertia than ``gyrostat_inertia``.
     """
-    axes, centres = wheels.axes, wheels.centres
-    centre = -wheels.mass * centres.sum(axis=0) / table.mass
-    offsets = table.mass * _point(centre) + wheels.mass * np.sum(
-        [_point(c) for c in centres], axis=0
-    )
+    axes, centres, mass = wheels.axes, wheels.centres, table.mass
+    assert mass is not None  # as in every table but that of a user's own model
+    centre = -wheels.mass * centres.sum(axis=0) / mass
+    offsets = mass * _point(centre) + wheels.mass * np.sum([_point(c) for c in centres], axis=0)
     across = wheels.transverse_inertia * (len(axes) * np.eye(3) - axes.T @ axes)
     if table.gyrostat_inertia is None:
         inertia = own if table.bus_inertia is None else np.array(table.bus_inertia)
@@ -106,7 +105,7 @@ def bus(table: PlantTable, wheels: Rotors, own: Array) -> tuple[Inertial, Array]
         inertia = gyrostat - across - offsets
         if np.linalg.eigvalsh(inertia)[0] <= 0.0:
             raise ValueError(_too_much(inertia, gyrostat - offsets, across, wheels))
-    return Inertial(table.mass, centre, *principal(inertia)), gyrostat
+    return Inertial(mass, centre, *principal(inertia)), gyrostat
 
 
 def principal(inertia: Array) -> tuple[Array, Array]:
@@ -149,6 +148,18 @@ def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inert
             "it more inertia, or the parts less"
         )
     return Inertial(left, centre, *principal(own))
+
+
+def together(bodies: Iterable[Inertial]) -> Array:
+    """Return the inertia matrix (3, 3) [kg m^2] of bodies about their common centre of mass.
+
+    All are in the same axes, and so is the result.
+    """
+    bodies = list(bodies)
+    mass = sum(body.mass for body in bodies)
+    centre = sum((body.mass * body.ipos for body in bodies), np.zeros(3)) / mass
+    parts = (tensor(b.inertia, b.iquat) + b.mass * _point(b.ipos - centre) for b in bodies)
+    return sum(parts, np.zeros((3, 3)))
 
 
 def tensor(inertia: Array, iquat: Array) -> Array:

@@ -17,8 +17,10 @@ import numpy as np
 from mjspace.contract import Array
 from mjspace.errors import input_error_at
 from mjspace.scenario.equipment import Driven
+from mjspace.scenario.model_source import ModelSource
 from mjspace.scenario.plant import Initial, PlantTable, Rates
-from mjspace.vehicle import composition, indices, mass_properties, model_checks
+from mjspace.vehicle import composition, indices, mass_properties, model_checks, own_model
+from mjspace.vehicle.roles import Recognized
 
 
 class UnphysicalInertiaWarning(UserWarning):
@@ -49,6 +51,8 @@ class Vehicle:
     """Index of each landing leg's strut in ``qpos``, shape (l,): positive where it is pressed."""
     driven: Driven
     """What of the model its actuators drive, by name."""
+    own: Recognized
+    """What the motors of a user's own model are; none of another."""
     speed_limit: float
     """Largest wheel speed relative to the bus [rad/s]; inf without a limit."""
     momentum: slice
@@ -64,41 +68,59 @@ class Vehicle:
         return self.driven.motors
 
 
-def build(table: PlantTable, rates: Rates, *, userdata: int) -> Vehicle:
+def build(
+    table: PlantTable, rates: Rates, *, userdata: int, source: ModelSource | None = None
+) -> Vehicle:
     """Return the vehicle that ``table`` describes, with ``userdata`` numbers of user data.
+
+    ``source`` is that of a user's own model.
 
     Raises:
         ValueError: an unknown model or part, wheels that leave no inertia for the bus or are
-            impossible as rotors, or a finding of ``model_checks.check``.
+            impossible as rotors, a model of one's own that cannot fly, or a finding of
+            ``model_checks.check``.
 
     Warns:
         UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown unchanged.
     """
-    spec = composition.compose(table)
+    spec, own = composition.compose(table, source)
     spec.option.timestep = rates.physics
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
     spec.nuserdata = userdata
 
     on_bus = (fitted.rotors for fitted in table.equipment.values())
     rotors = next(filter(None, on_bus), mass_properties.Rotors())
-    if table.vehicle_mass is not None:
+    if source is not None:
+        model, gyrostat = own_model.compiled(spec), None
+    elif table.vehicle_mass is not None:
         gyrostat = np.array(table.vehicle_inertia)
-        inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, _others(spec))
+        bodies = inertials(spec.compile())
+        others = [each for name, each in bodies.items() if name != composition.bus_of(spec).name]
+        inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, others)
+        model = _compile(spec, inertial)
     else:
-        own = mass_properties.own_inertia(spec.body("bus"))
-        inertial, gyrostat = mass_properties.bus(table, rotors, own)
-    model = _compile(spec, inertial)
+        stated = mass_properties.own_inertia(composition.bus_of(spec))
+        inertial, gyrostat = mass_properties.bus(table, rotors, stated)
+        model = _compile(spec, inertial)
     model_checks.check(model)
-    driven = Driven.together(_driven(model, table))
+    driven = Driven.together([own.driven, *_driven(model, table)])
+    where = indices.of(model, driven)
+    axes, inertia = rotors.axes, np.full(len(rotors.axes), rotors.inertia)
+    if gyrostat is None:
+        axes = indices.axes(model, where["wheel_dof"])
+        inertia = indices.axial_inertia(model, where["wheel_dof"])
+        gyrostat = mass_properties.together(inertials(model).values())
+        gyrostat -= axes.T @ (inertia[:, None] * axes)
 
     return Vehicle(
         model=model,
+        own=own,
         inertia=indices.frozen(gyrostat),
-        wheel_axes=indices.frozen(rotors.axes),
-        wheel_inertia=indices.frozen(np.full(len(rotors.axes), rotors.inertia)),
+        wheel_axes=indices.frozen(axes),
+        wheel_inertia=indices.frozen(inertia),
         driven=driven,
         speed_limit=rotors.speed_limit,
-        **indices.of(model, driven),
+        **where,
     )
 
 
@@ -188,7 +210,7 @@ def _driven(model: Any, table: PlantTable) -> Iterator[Driven]:
 
 
 def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
-    body, moments = spec.body("bus"), inertial.inertia
+    body, moments = composition.bus_of(spec), inertial.inertia
     body.mass, body.ipos, _, body.iquat = inertial
     body.fullinertia = np.full(6, np.nan)  # unset: the principal moments hold
     excess = moments[2] - moments[1] - moments[0]
@@ -203,34 +225,32 @@ def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
             UnphysicalInertiaWarning,
             stacklevel=3,
         )
-        model.body("bus").inertia = moments
+        model.body(body.name).inertia = moments
         mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
 
 
-def _others(spec: Any) -> list[mass_properties.Inertial]:
-    """Return the mass properties of all bodies but the bus, in the bus's axes, joints at rest."""
-    model = spec.compile()
+def inertials(model: Any) -> dict[str, mass_properties.Inertial]:
+    """Return the vehicle's bodies by name: mass properties in the bus's axes, joints at rest."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    bus = model.body("bus").id
+    bus = indices.bus_id(model)
     axes, origin = data.xmat[bus].reshape(3, 3), data.xpos[bus]
-    others = []
+    found = {}
     for body in range(1, model.nbody):
-        if body != bus and model.body_rootid[body] == bus and model.body_mass[body] > 0.0:
+        if model.body_rootid[body] == model.body_rootid[bus] and model.body_mass[body] > 0.0:
             quat = np.zeros(4)
             mujoco.mju_mat2Quat(quat, (axes.T @ data.ximat[body].reshape(3, 3)).ravel())
             place = axes.T @ (data.xipos[body] - origin)
-            moments = model.body_inertia[body].copy()
-            others.append(
-                mass_properties.Inertial(float(model.body_mass[body]), place, moments, quat)
+            found[model.body(body).name] = mass_properties.Inertial(
+                float(model.body_mass[body]), place, model.body_inertia[body].copy(), quat
             )
-    return others
+    return found
 
 
 def _speeds_for(vehicle: Vehicle, data: Any, momentum: Array) -> Array:
     """Return the wheel speeds (n,) [rad/s] for a total ``momentum`` (3,) [N m s], inertial axes."""
-    bus = vehicle.model.body("bus").id
+    bus = indices.bus_id(vehicle.model)
     matrix = np.zeros((3, vehicle.model.nv))
     mujoco.mj_fwdPosition(vehicle.model, data)
     mujoco.mj_angmomMat(vehicle.model, data, matrix, bus)

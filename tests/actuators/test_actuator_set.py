@@ -162,7 +162,7 @@ def test_two_kinds_cannot_be_logged_under_one_name() -> None:
         ActuatorSet((ReactionWheels(np.eye(3)), Coordinator()))
 
 
-def test_motors_are_found_by_name_and_stand_side_by_side() -> None:
+def test_motors_are_found_by_name_wherever_they_stand() -> None:
     joints = "".join(f'<body><joint name="{n}"/><geom size="1"/></body>' for n in "abc")
     motors_in = "".join(f'<motor name="wheel_{i}" joint="{n}"/>' for i, n in ((2, "a"), (0, "b")))
     xml = "<mujoco><worldbody>{}</worldbody><actuator>{}</actuator></mujoco>"
@@ -170,8 +170,11 @@ def test_motors_are_found_by_name_and_stand_side_by_side() -> None:
         xml.format(joints, motors_in + '<motor name="wheel_1" joint="c"/>')
     )
     batch = Batch(model, 2, 1)
-    (view,) = ActuatorSet((ReactionWheels(np.eye(3)[:2]),)).inputs(batch)
-    view[:] = [[1.0, 2.0], [3.0, 4.0]]
-    assert batch.bind("ctrl").tolist() == [[0.0, 1.0, 2.0], [0.0, 3.0, 4.0]]
-    with pytest.raises(ValueError, match="must stand side by side and in order in ctrl"):
-        ActuatorSet((ReactionWheels(np.eye(3)),)).inputs(batch)
+    for count, desired in (
+        (2, [[0.0, 1.0, 2.0], [0.0, 4.0, 5.0]]),
+        (3, [[3.0, 1.0, 2.0], [6.0, 4.0, 5.0]]),
+    ):
+        (views,) = ActuatorSet((ReactionWheels(np.eye(3)[:count]),)).inputs(batch)
+        for view, part in views:
+            view[:] = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])[:, part]
+        assert batch.bind("ctrl").tolist() == desired

@@ -206,9 +206,9 @@ def test_urdf_angles_are_the_geoms_orientation(angles: tuple[float, ...]) -> Non
 
 
 def test_the_layout_shows_topics_of_the_log() -> None:
-    whole = json.loads(layout())
+    whole = json.loads(layout("hub"))
     assert {panel.partition("!")[0] for panel in whole["configById"]} == {"3D", "Plot"}
-    paths = re.findall(r'"value": "(/\w+)\.(\w+)', layout().decode())
+    paths = re.findall(r'"value": "(/\w+)\.(\w+)', layout("hub").decode())
     assert {("/truth", "attitude_error"), ("/truth", "rate"), ("/truth", "wheel_speed")} <= set(
         paths
     )

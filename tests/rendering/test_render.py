@@ -147,7 +147,7 @@ def test_up_is_up_and_right_is_right() -> None:
             <camera name="front" pos="0 -4 0" xyaxes="1 0 0 0 0 1"/>
             <geom size=".4" pos="0 0 1" rgba="1 0 0 1"/>
             <geom size=".4" pos="1 0 0" rgba="0 1 0 1"/>
-            <body name="bus"/>
+            <body name="bus"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>
           </worldbody>
         </mujoco>"""
     )

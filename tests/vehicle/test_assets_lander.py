@@ -29,7 +29,7 @@ WEIGHT = 1.62  # m/s^2
 def landscape(ground: str, **table: float) -> Any:
     place = Ground(part=ground, **table)
     plant = PlantTable(model="lander", wheels=Wheels(axes=[]), ground=place)
-    return composition.compose(plant).compile()
+    return composition.compose(plant).spec.compile()
 
 
 def height(model: Any, x: float, y: float) -> float:
