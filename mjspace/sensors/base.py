@@ -24,6 +24,8 @@ class Surroundings:
     """What a vehicle's sensors need to know of the vehicle and of where it flies."""
 
     wheels: int = 0
+    own_sensors: tuple[str, ...] = ()
+    """Fields of the truth that the sensors of the vehicle's own model have read."""
     gravity: Callable[[Array], Array] = np.zeros_like
     """What accelerometers do not measure [m/s^2], (..., 3), at each position [m], (..., 3)."""
     magnetic_field: Callable[[Array], Array] | None = None

@@ -61,6 +61,7 @@ class SensorSuite:
         own = {sensor.name for sensor in self._sampled}
         self._ideal = {n: table.measures for n, table in sensors.items() if n not in own}
         self._reported = [name for name in REPORTED_BY_PLANT if name != "wheel_speed"]
+        self._reported += surroundings.own_sensors
         # The fields of a truth that is reported as it is, without a copy.
         same = not self._sampled and all(name == q for name, q in self._ideal.items())
         self._as_it_is = {*self._ideal, *self._reported} if same else set()

@@ -81,6 +81,7 @@ class Assembly:
         orbit = self.scenario.environment.orbit
         return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
+            own_sensors=tuple(s.field for s in self.vehicle.own.sensors if s.measured),
             gravity=self._gravity,
             magnetic_field=None if self.field is None else self.field.at,
             orbit_position=None if orbit is None else partial(orbit_position, orbit),

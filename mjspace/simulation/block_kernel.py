@@ -60,10 +60,10 @@ ORDERS = np.dtype([
     ("saturated_record", _NUMBER),
     # MuJoCo's sensors: in the memory, word of mjData, size
     ("sensors", _NUMBER), ("sensors_word", _NUMBER), ("sensors_size", _NUMBER),
-    # 1 where step effects look at what touches; what they report in a section, in the memory; where
-    # the period of the first report is noted of each vehicle
-    ("looks", _NUMBER), ("told_looking", *_TABLE), ("told_sensing", *_TABLE),
-    ("told_preparing", *_TABLE), ("stopped", _NUMBER),
+    # 1 where step effects look at them at control instants, and in steps; what they report in a
+    # section, in the memory; where the period of the first report is noted of each vehicle
+    ("looks", _NUMBER), ("looks_in_steps", _NUMBER), ("told_looking", *_TABLE),
+    ("told_sensing", *_TABLE), ("told_preparing", *_TABLE), ("stopped", _NUMBER),
 ])  # fmt: skip
 """What is flown; places in a memory are offsets [bytes], sizes are in bytes."""
 _ORDERS = from_dtype(ORDERS)
@@ -257,7 +257,7 @@ def _fly_steps(
         if step == 0:
             copy_bytes(base + orders.sensors, fields[orders.sensors_word], orders.sensors_size)
             _copy(record, base, _table(orders.after, 3))
-        elif orders.looks and _look(orders, words, base, fields):
+        elif orders.looks_in_steps and _look(orders, words, base, fields):
             return True
         if acting:
             _copy(base, base, after_driving)

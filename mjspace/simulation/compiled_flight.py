@@ -263,7 +263,9 @@ class CompiledFlight:
             orders[name] = getattr(words_of_model, name)
         orders["bodies"] = model.nbody
         orders["most_constraints"] = struct_offsets.most_constraints()
-        orders["looks"] = any(effect.looks for effect in self._effects)
+        looking = [effect for effect in self._effects if effect.looks]
+        orders["looks"] = bool(looking)
+        orders["looks_in_steps"] = any(effect.every_step for effect in looking)
         for name in ("looking", "sensing", "preparing"):
             told = getattr(period, name).report
             orders[f"told_{name}"] = (self._offset(told), told.size) if told.size else (0, 0)

@@ -9,6 +9,7 @@ from mjspace.simulation.magnetic_field import MagneticField
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_disturbance import UserDisturbance
 from mjspace.vehicle import deployments, ground_contact
+from mjspace.vehicle.model_sensors import ModelSensors
 from mjspace.vehicle.step_effect import StepEffect
 
 
@@ -19,6 +20,7 @@ def effects_of(
     scenario, model = assembly.scenario, assembly.vehicle.model
     every = (
         ground_contact.of(model, layout.struts, layout.velocity),
+        ModelSensors.of(model, assembly.vehicle.own.sensors),
         ActuatorFaults.of(assembly, members),
         BurningMass.of(assembly.actuators),
         MagneticField.of(assembly.field),

@@ -12,6 +12,7 @@ from mjspace.contract import Array
 from mjspace.errors import nearest
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.plant import Roles
+from mjspace.vehicle.model_sensors import ModelSensor, sensors_of
 
 _ON_AXIS = 1e-3
 """How far a wheel's mass centre may be off its axis, as a share of its radius of gyration, and its
@@ -44,6 +45,8 @@ class Recognized:
     """All others, which are commanded in MuJoCo's own terms."""
     gimbals: tuple[str, ...] = ()
     """Hinges that the others turn."""
+    sensors: tuple[ModelSensor, ...] = ()
+    """The model's own."""
 
     @property
     def driven(self) -> Driven:
@@ -91,6 +94,7 @@ def recognize(model: Any, roles: Roles) -> Recognized:
         thrusters=tuple(_in_si(model, i) for i in thrusters),
         others=tuple(_motor(model, i) for i in others),
         gimbals=tuple(model.joint(joint).name for joint in hinges),
+        sensors=sensors_of(model),
     )
 
 

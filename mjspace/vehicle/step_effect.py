@@ -79,7 +79,8 @@ class StepEffect(ABC):
     not_compiled: str = "it is called in Python"
     """Why a flight with it is flown in Python; "" where it is compiled."""
     looks: ClassVar[bool] = False
-    """Whether it has a ``look``, at each control instant and integration step."""
+    """Whether it has a ``look``, at each control instant and, if it acts in them, each integration
+    step."""
     waits: bool = False
     """Whether it has an ``alarm``, at each control instant."""
     fields: ClassVar[tuple[str, ...]] = ()
