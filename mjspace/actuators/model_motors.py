@@ -96,7 +96,7 @@ class ModelThrusters(_Clipped):
     """Forces at sites that are throttled: each pushes with the commanded force [N]."""
 
     field: ClassVar[str] = "thruster_force"
-    logged_as: ClassVar[str] = "thruster_thrust"
+    logged_as: ClassVar[str] = "applied_force"
     unit: ClassVar[str] = "N"
 
 

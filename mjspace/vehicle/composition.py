@@ -19,7 +19,7 @@ from mjspace.vehicle.roles import Recognized
 ASSETS = Path(str(files("mjspace.assets")))
 """The folder of the models and their parts."""
 _CAMERA = "chase"
-_VIEW = np.array([3.0, -1.5, 0.95])
+_VIEW = np.array([1.9, -0.95, 0.6])
 """From the bus to the camera, in extents of the vehicle."""
 _LOOK = {
     "map": ("znear", "zfar"),
@@ -47,6 +47,13 @@ def compose(table: PlantTable, source: ModelSource | None = None) -> Composed:
         ValueError: an unknown model, part or hinge; equipment that cannot be attached; a model of
             one's own that cannot fly.
     """
+    with warnings.catch_warnings():
+        # Files of ours are found where they are, also those of parts of a model that has its own.
+        warnings.filterwarnings("ignore", "Attaching a child without asset dict")
+        return _composed(table, source)
+
+
+def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
     if source is None:
         spec, own = _load(table.model), Recognized()
     else:
@@ -128,9 +135,7 @@ def _add_surroundings(spec: Any, model: Any) -> None:
         for name in names:
             value = getattr(getattr(scenery.visual, group), name)
             setattr(getattr(spec.visual, group), name, value)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of its files, which are found where they are
-        spec.attach(scenery, prefix="space_", frame=spec.worldbody.add_frame())
+    spec.attach(scenery, prefix="space_", frame=spec.worldbody.add_frame())
     spec.geom("space_planet").name = "planet"
 
 

@@ -1,7 +1,8 @@
 """A user's own model, made ready to fly: its bus free, its world replaced, its motors in SI."""
 
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -42,32 +43,46 @@ def open_source(model: str, trust: Trust) -> ModelSource:
         raise ValueError(f"{model} raised {type(error).__name__}: {error}") from error
     if not isinstance(spec, mujoco.MjSpec):
         raise ValueError(f"{model} returned a {type(spec).__name__}, should be an mujoco.MjSpec")
-    compiled(spec)
-    return _source_of_spec(spec, trust.folder / place)
+    return _source_of_spec(spec, (trust.folder / place).parent)
 
 
-def _source_of_spec(spec: Any, file: Path) -> ModelSource:
-    """Return a spec as XML, and the files that it names: its own assets, or beside the ``file``."""
-    known: dict[str, bytes] = {**spec.assets, _BUILT: spec.to_xml().encode()}
-
-    def read(path: str) -> bytes:
-        return known[path] if path in known else (file.parent / path).read_bytes()
-
-    return source_of(_BUILT, read)
+def _source_of_spec(spec: Any, folder: Path) -> ModelSource:
+    """Return a spec as XML, and the files that it names: its own assets, or of the ``folder``."""
+    for element in (*spec.meshes, *spec.textures, *spec.hfields, *spec.skins):
+        if element.file and element.file not in spec.assets:
+            spec.assets[element.file] = (folder / element.file).read_bytes()
+    with _in_one_line():
+        spec.compile()
+        text = spec.to_xml()
+    files: dict[str, bytes] = {**spec.assets, _BUILT: text.encode()}
+    return source_of(_BUILT, files.__getitem__)
 
 
 def read(source: ModelSource) -> Any:
     """Return the ``MjSpec`` of a model file, made of none but the files of its ``source``.
 
     Raises:
-        ValueError: MuJoCo cannot read it; the message is one line.
+        ValueError: MuJoCo cannot read or compile it; the message is one line.
     """
+    # A copy of a spec lacks what refers to nothing, and compiling one removes static bodies.
+    with _in_one_line():
+        _parsed(source).compile()
+        return _parsed(source)
+
+
+def _parsed(source: ModelSource) -> Any:
     texts = {name: text for name, text in source.files.items() if name.endswith(KINDS)}
+    main = source.files[source.main].decode()
+    return mujoco.MjSpec.from_string(main, include=texts, assets=source.files)
+
+
+@contextmanager
+def _in_one_line() -> Iterator[None]:
+    """Turn MuJoCo's errors into a ValueError of one line, and drop its warnings."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            text = source.files[source.main].decode()
-            return mujoco.MjSpec.from_string(text, include=texts, assets=source.files)
+            yield
     except (ValueError, mujoco.FatalError) as error:
         raise ValueError(one_line(str(error))) from error
 
@@ -122,12 +137,8 @@ def compiled(spec: Any) -> Any:
     Raises:
         ValueError: MuJoCo cannot compile it; the message is one line.
     """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return spec.copy().compile()
-    except (ValueError, mujoco.FatalError) as error:
-        raise ValueError(one_line(str(error))) from error
+    with _in_one_line():
+        return spec.copy().compile()
 
 
 def free(spec: Any, bus: str | None) -> None:
