@@ -30,4 +30,9 @@ def model_of(log: Log, scenario: Scenario) -> ModelSource | None:
     if not scenario.plant.is_own:
         return None
     folder, _, _ = scenario.plant.model.rpartition("/")
-    return source_of(scenario.plant.model, lambda path: log.attachment(f"{folder}/{path}"))
+
+    def read(path: str) -> bytes | None:
+        name = f"{folder}/{path}"
+        return log.attachment(name) if name in log.attachments else None
+
+    return source_of(scenario.plant.model, read)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import PurePosixPath
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 from mjspace.scenario.trust import Trust
@@ -10,6 +11,7 @@ from mjspace.scenario.trust import Trust
 KINDS = (".xml", ".urdf")
 """How the name of a model file ends: MJCF or URDF."""
 _FOLDERS = ("meshdir", "texturedir", "assetdir")  # attributes of <compiler>
+_OUTSIDE = "outside"  # the folder of files in the log that lie outside the model's own
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,17 @@ class ModelSource:
         return PurePosixPath(self.name).name
 
 
+class _Reference(NamedTuple):
+    """A file that a model refers to; its paths are from the folder of the main one."""
+
+    places: tuple[str, ...]
+    """Where it may be."""
+    folder: str
+    """Of the model that the file's own references are of."""
+    owner: str
+    """The file that names it."""
+
+
 def is_own(model: str) -> bool:
     """Return whether ``plant.model`` names a user's file, not one of the models in assets/."""
     place = model.partition(":")[0]
@@ -40,74 +53,70 @@ def read_source(name: str, trust: Trust) -> ModelSource:
         ValueError: it or a file that it refers to is not there, is no XML, or lies outside the
             scenario's folder, which is not trusted.
     """
-    place = trust.file(name)
     folder = PurePosixPath(name).parent
 
-    def read(path: str) -> bytes:
+    def read(path: str) -> bytes | None:
         file = trust.file(type(name)((folder / path).as_posix()))  # as trusted as the model is
-        if not file.is_file():
-            raise ValueError(f"{place}: no file {path!r}, which it refers to")
-        return file.read_bytes()
+        return file.read_bytes() if file.is_file() else None
 
-    if not place.is_file():
-        raise ValueError(f"no file {place}")
     return source_of(name, read)
 
 
-def source_of(name: str, read: Callable[[str], bytes]) -> ModelSource:
-    """Return the model ``name`` with what it refers to; ``read`` takes paths from its folder.
+def source_of(name: str, read: Callable[[str], bytes | None]) -> ModelSource:
+    """Return the model ``name`` with what it refers to.
+
+    ``read`` returns the file at a path from the model's folder, None where there is none.
 
     Raises:
-        ValueError: one of its XML files is no XML; or ``read`` raises it.
+        ValueError: a file is missing, or is no XML; or ``read`` raises it.
     """
     main = PurePosixPath(name).name
     files: dict[str, bytes] = {}
-    queue = [(main, "")]
+    queue = [_Reference((main,), "", name)]
     while queue:
-        path, folder = queue.pop()
-        if path in files:
-            continue
-        files[path] = read(path)
-        if PurePosixPath(path).suffix in KINDS:
-            queue += _referred(path, files[path], folder)
+        reference = queue.pop()
+        found = ((place, read(place)) for place in reference.places)
+        place, content = next((each for each in found if each[1] is not None), ("", None))
+        if content is None:
+            raise ValueError(f"no file {reference.places[0]!r} (named in {reference.owner})")
+        if _kept(place) not in files:
+            files[_kept(place)] = content
+            if PurePosixPath(place).suffix in KINDS:
+                queue += _referred(place, content, reference.folder)
     return ModelSource(name, files)
 
 
-def _referred(path: str, text: bytes, folder: str) -> Iterator[tuple[str, str]]:
-    """Yield each file that the XML ``text`` refers to, and the folder of the files in that.
+def _kept(place: str) -> str:
+    """Return the name in the log of a file at that place, which may be outside the folder."""
+    path = PurePosixPath(place)
+    outside = path.is_absolute() or ".." in path.parts
+    return f"{_OUTSIDE}/{path.name}" if outside else place
 
-    Paths are from the main model's folder; ``folder`` is that of the model which includes it.
-    """
+
+def _referred(path: str, text: bytes, folder: str) -> Iterator[_Reference]:
+    """Yield each file that the XML ``text`` refers to; ``folder`` is that of its model."""
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise ValueError(f"{path} is no XML: {error}") from None
     compilers = list(root.iter("compiler"))
-    folders = {key: c.get(key, "") for c in compilers for key in _FOLDERS if c.get(key)}
+    set_by = {key: c.get(key, "") for c in compilers for key in _FOLDERS if c.get(key)}
+    beside = str(PurePosixPath(path).parent)
     for element in root.iter():
         for key, file in element.attrib.items():
             if not key.startswith("file"):
                 continue
-            if element.tag in ("include", "model"):
-                below = "" if element.tag == "include" else str(PurePosixPath(file).parent)
-                yield _joined(folder, file), _joined(folder, below)
-            elif root.tag == "robot":
-                yield _of_urdf(path, file, compilers), ""
-            else:
-                own = "texturedir" if element.tag == "texture" else "meshdir"
-                under = folders.get(own) or folders.get("assetdir") or ""
-                yield _joined(folder, _joined(under, file)), ""
-
-
-def _of_urdf(path: str, file: str, compilers: list[ElementTree.Element]) -> str:
-    """Return where MuJoCo looks for a file of a URDF: without its folder, if not told otherwise."""
-    if "://" in file:
-        raise ValueError(
-            f"{path}: {file!r} is looked up by ROS: write a path from the model's folder"
-        )
-    strips = next((c.get("strippath") for c in compilers if c.get("strippath")), "true")
-    folder = next((c.get("meshdir", "") for c in compilers if c.get("meshdir")), "")
-    return _joined(folder, PurePosixPath(file).name if strips == "true" else file)
+            if "://" in file:
+                raise ValueError(f"{path}: {file!r} is for ROS: write a path from its own folder")
+            own = "texturedir" if element.tag == "texture" else "meshdir"
+            under = set_by.get(own) or set_by.get("assetdir") or ""
+            # MuJoCo looks in the folder of the model, and of the file that is included in it.
+            names = (_joined(under, file), file, PurePosixPath(file).name)
+            near = [_joined(base, name) for name in names for base in (folder, beside)]
+            kept = [_joined(base, _kept(file)) for base in (folder, beside)]
+            inner = _joined(folder, str(PurePosixPath(file).parent))
+            places = tuple(dict.fromkeys([*near, *kept]))
+            yield _Reference(places, inner if element.tag == "model" else folder, path)
 
 
 def _joined(folder: str, file: str) -> str:

@@ -55,7 +55,7 @@ def _source_of_spec(spec: Any, folder: Path) -> ModelSource:
         spec.compile()
         text = spec.to_xml()
     files: dict[str, bytes] = {**spec.assets, _BUILT: text.encode()}
-    return source_of(_BUILT, files.__getitem__)
+    return source_of(_BUILT, files.get)
 
 
 def read(source: ModelSource) -> Any:

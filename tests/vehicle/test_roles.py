@@ -10,7 +10,7 @@ from mjspace.vehicle.roles import Recognized, places_and_directions
 
 
 def recognized(text: str, **roles: object) -> Recognized:
-    return own_model.prepare(own_model.read(source(text)), Roles(**roles), lands=False)[0]  # type: ignore[arg-type]
+    return own_model.prepare(own_model.read(source(text)), Roles(**roles), lands=False)[0]
 
 
 def names(found: Recognized, role: str) -> list[str]:
