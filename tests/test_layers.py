@@ -50,7 +50,7 @@ ROOMS = {
     "runner": "contract errors interrupts log scenario signals simulation units vehicle",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
-    "validation": "attitude contract environment log plotting runner scenario vehicle",
+    "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
     "cli": "errors log plotting rendering runner scenario simulation terminal validation",
     "__main__": "cli interrupts",
 }

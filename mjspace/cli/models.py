@@ -68,13 +68,10 @@ def _inspected(
     model: Path, bus: str = "", wheels: Sequence[str] = ()
 ) -> tuple["ModelSource", "Inspection"]:
     from mjspace.scenario.plant import Roles
-    from mjspace.scenario.trust import CommandLineText, Trust
     from mjspace.simulation import mujoco_warnings
     from mjspace.validation import inspection
-    from mjspace.vehicle import own_model
 
     mujoco_warnings.silence()
     with input_error_at("MODEL"):
-        source = own_model.open_source(CommandLineText(str(model)), Trust(Path()))
         roles = Roles(bus=bus or None, wheels=list(wheels) or None)
-        return source, inspection.inspect(source, roles)
+        return inspection.inspect_file(model, roles)

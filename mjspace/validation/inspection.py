@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -14,6 +15,7 @@ from mjspace.environment.install import userdata_size
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.model_source import ModelSource
 from mjspace.scenario.plant import PlantTable, Rates, Roles
+from mjspace.scenario.trust import CommandLineText, Trust
 from mjspace.validation import model_files
 from mjspace.validation.passport import Finding
 from mjspace.validation.results import Data
@@ -123,13 +125,22 @@ class Inspection(Data):
         return self.vehicle is not None
 
 
-def inspect(source: ModelSource, wanted: Roles | None = None) -> Inspection:
+def inspect_file(path: Path, wanted: Roles) -> tuple[ModelSource, Inspection]:
+    """Return the source of the user's model at ``path``, and what is recognized in it.
+
+    Raises:
+        ValueError: it cannot be read; as ``inspect``.
+    """
+    source = own_model.open_source(CommandLineText(str(path)), Trust(Path()))
+    return source, inspect(source, wanted)
+
+
+def inspect(source: ModelSource, wanted: Roles) -> Inspection:
     """Return what is recognized in a model under the ``wanted`` roles.
 
     Raises:
         ValueError: MuJoCo cannot read or compile it.
     """
-    wanted = wanted or Roles()
     spec = own_model.read(source)
     own_model.name_all(spec)
     own_model.free(spec, wanted.bus)
