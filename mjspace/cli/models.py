@@ -1,9 +1,8 @@
 """The commands ``mjspace inspect`` and ``mjspace new``: models of one's own."""
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -24,12 +23,16 @@ def inspect(
         list[str],
         typer.Option("--wheel", metavar="PATTERN", help="Motors of reaction wheels; repeatable."),
     ] = [],  # noqa: B006
+    without_armature: Annotated[
+        bool, typer.Option("--without-armature", help="Leave the armature of its joints out.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Show what is recognized in a model of yours, and what keeps it from flying."""
     from mjspace.validation import inspection_table
 
-    _, found = _inspected(model, bus, wheels)
+    roles = {"bus": bus or None, "wheels": wheels or None}
+    _, found = _inspected(model, {"roles": roles, "without_armature": without_armature})
     if as_json:
         print(found.model_dump_json(indent=2))
     else:
@@ -53,7 +56,7 @@ def new(
         raise InputError(f"NAME: {name} is there already: choose another name")
     source = found = None
     if model is not None:
-        source, found = _inspected(model)
+        source, found = _inspected(model, {})
         if not found.flies:
             inspection_table.show(found)
             raise typer.Exit(1)
@@ -64,14 +67,10 @@ def new(
     print(f"{folder}: fly it by 'mjspace run {folder}/{name}.toml'")
 
 
-def _inspected(
-    model: Path, bus: str = "", wheels: Sequence[str] = ()
-) -> tuple["ModelSource", "Inspection"]:
-    from mjspace.scenario.plant import Roles
+def _inspected(model: Path, plant: dict[str, Any]) -> tuple["ModelSource", "Inspection"]:
     from mjspace.simulation import mujoco_warnings
     from mjspace.validation import inspection
 
     mujoco_warnings.silence()
     with input_error_at("MODEL"):
-        roles = Roles(bus=bus or None, wheels=list(wheels) or None)
-        return inspection.inspect_file(model, roles)
+        return inspection.inspect_file(model, plant)

@@ -38,6 +38,8 @@ class _Reference(NamedTuple):
     """Of the model that the file's own references are of."""
     owner: str
     """The file that names it."""
+    only_drawn: bool = False
+    """Whether MuJoCo can do without it: it leaves out what a URDF has for pictures alone."""
 
 
 def is_own(model: str) -> bool:
@@ -77,6 +79,8 @@ def source_of(name: str, read: Callable[[str], bytes | None]) -> ModelSource:
         reference = queue.pop()
         found = ((place, read(place)) for place in reference.places)
         place, content = next((each for each in found if each[1] is not None), ("", None))
+        if content is None and reference.only_drawn:
+            continue
         if content is None:
             raise ValueError(f"no file {reference.places[0]!r} (named in {reference.owner})")
         if _kept(place) not in files:
@@ -102,11 +106,14 @@ def _referred(path: str, text: bytes, folder: str) -> Iterator[_Reference]:
     compilers = list(root.iter("compiler"))
     set_by = {key: c.get(key, "") for c in compilers for key in _FOLDERS if c.get(key)}
     beside = str(PurePosixPath(path).parent)
+    drawn = {mesh for visual in root.iter("visual") for mesh in visual.iter("mesh")}
     for element in root.iter():
+        if root.tag == "robot" and element.tag != "mesh":
+            continue  # a simulator's own, as a plugin of Gazebo's
         for key, file in element.attrib.items():
             if not key.startswith("file"):
                 continue
-            if "://" in file:
+            if "://" in file and element not in drawn:
                 raise ValueError(f"{path}: {file!r} is for ROS: write a path from its own folder")
             own = "texturedir" if element.tag == "texture" else "meshdir"
             under = set_by.get(own) or set_by.get("assetdir") or ""
@@ -116,7 +123,8 @@ def _referred(path: str, text: bytes, folder: str) -> Iterator[_Reference]:
             kept = [_joined(base, _kept(file)) for base in (folder, beside)]
             inner = _joined(folder, str(PurePosixPath(file).parent))
             places = tuple(dict.fromkeys([*near, *kept]))
-            yield _Reference(places, inner if element.tag == "model" else folder, path)
+            folder_of_it = inner if element.tag == "model" else folder
+            yield _Reference(places, folder_of_it, path, only_drawn=element in drawn)
 
 
 def _joined(folder: str, file: str) -> str:

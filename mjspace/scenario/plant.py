@@ -22,6 +22,7 @@ from mjspace.scenario.fields import (
     Quaternion,
     Rate3,
     Si,
+    Switch,
     Table,
     Velocity3,
 )
@@ -98,6 +99,9 @@ class PlantTable(Table):
     has its own mass properties, and no wheels but its own and those of ``[plant.wheels]``."""
     roles: Roles = Roles()
     """Of a model of one's own."""
+    without_armature: Switch = False
+    """Of a model of one's own: whether it flies without the armature of its joints, whose momentum
+    would have no reaction on the bus; with it, it is refused."""
     mass: Annotated[Positive, Si("kg")] | None = 100.0
     """Mass of the bus alone; a model of one's own has its own."""
     bus_inertia: Matrix3 | None = None

@@ -14,7 +14,7 @@ from mjspace.contract import Array
 from mjspace.environment.install import userdata_size
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.model_source import ModelSource
-from mjspace.scenario.plant import PlantTable, Rates, Roles
+from mjspace.scenario.plant import PlantTable, Rates
 from mjspace.scenario.trust import CommandLineText, Trust
 from mjspace.validation import model_files
 from mjspace.validation.passport import Finding
@@ -125,29 +125,31 @@ class Inspection(Data):
         return self.vehicle is not None
 
 
-def inspect_file(path: Path, wanted: Roles) -> tuple[ModelSource, Inspection]:
+def inspect_file(path: Path, plant: dict[str, Any]) -> tuple[ModelSource, Inspection]:
     """Return the source of the user's model at ``path``, and what is recognized in it.
+
+    ``plant`` has other keys of [plant].
 
     Raises:
         ValueError: it cannot be read; as ``inspect``.
     """
     source = own_model.open_source(CommandLineText(str(path)), Trust(Path()))
-    return source, inspect(source, wanted)
+    return source, inspect(source, PlantTable(model=source.name, **plant))
 
 
-def inspect(source: ModelSource, wanted: Roles) -> Inspection:
-    """Return what is recognized in a model under the ``wanted`` roles.
+def inspect(source: ModelSource, table: PlantTable) -> Inspection:
+    """Return what is recognized in the model of a plant.
 
     Raises:
         ValueError: MuJoCo cannot read or compile it.
     """
     spec = own_model.read(source)
     own_model.name_all(spec)
-    own_model.free(spec, wanted.bus)
+    own_model.free(spec, table.roles.bus)
     model = own_model.compiled(spec)
     texts = [*_replaced(model), *model_files.findings(spec)]
     findings = [Finding(refused=False, text=text) for text in texts]
-    vehicle = _vehicle(source, wanted, model, findings)
+    vehicle = _vehicle(source, table, model, findings)
     return Inspection(
         model=source.name,
         step=_rates(model).physics,
@@ -165,9 +167,8 @@ def _rates(model: Any) -> Rates:
 
 
 def _vehicle(
-    source: ModelSource, wanted: Roles, model: Any, findings: list[Finding]
+    source: ModelSource, table: PlantTable, model: Any, findings: list[Finding]
 ) -> Vehicle | None:
-    table = PlantTable(model=source.name, roles=wanted)
     size = userdata_size(Environment(), table)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

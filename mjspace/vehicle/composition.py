@@ -60,7 +60,12 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
         with input_error_at(f"plant.model: {source.name}"):
             spec = own_model.read(source)
         with input_error_at("plant"):
-            own, bare = own_model.prepare(spec, table.roles, lands=table.ground is not None)
+            own, bare = own_model.prepare(
+                spec,
+                table.roles,
+                lands=table.ground is not None,
+                armature=not table.without_armature,
+            )
         _add_surroundings(spec, bare)
     _add_sensors(spec)
     of_model = _joint_names(spec)

@@ -92,13 +92,16 @@ def one_line(text: str) -> str:
     return ", ".join(line.strip(" :,") for line in text.splitlines() if line.strip(" :,"))
 
 
-def prepare(spec: Any, roles: Roles, *, lands: bool) -> tuple[Recognized, Any]:
+def prepare(
+    spec: Any, roles: Roles, *, lands: bool = False, armature: bool = True
+) -> tuple[Recognized, Any]:
     """Make a model ready to fly; return what its motors are, and how it compiles.
 
     The vehicle stays as it is. What a scenario has itself replaces the model's: gravity, medium and
-    keyframes. Bodies, joints and motors without a name get one; the bus gets a free joint, and
-    hinges of wheels get a motor, where ``roles`` says so and there is none; motors of wheels and
-    thrusters are commanded by torque [N m] and force [N]. Contacts are off, unless it ``lands``.
+    keyframes. Bodies, joints, motors and sensors without a name get one; the bus gets a free joint,
+    and hinges of wheels get a motor, where ``roles`` says so and there is none; motors of wheels
+    and thrusters are commanded by torque [N m] and force [N]. Contacts are off, unless it
+    ``lands``; its armature is left out, if that is not wanted.
 
     Raises:
         ValueError: MuJoCo cannot compile it; no body is called as ``roles`` says; or as
@@ -106,6 +109,14 @@ def prepare(spec: Any, roles: Roles, *, lands: bool) -> tuple[Recognized, Any]:
     """
     name_all(spec)
     free(spec, roles.bus)
+    if not any(joint.type == _FREE for joint in spec.joints):
+        raise ValueError(
+            f"plant.model: no free joint: the vehicle hangs on the world; give its bus a "
+            f"<freejoint/>, or name it as plant.roles.bus, which frees it: {_roots(spec)}"
+        )
+    if not armature:
+        for element in (*spec.joints, *spec.tendons, *spec.actuators):
+            element.armature = 0.0
     _add_motors(spec, roles.wheels or ())
     _set_options(spec, lands=lands)
     for key in list(spec.keys):
@@ -175,6 +186,13 @@ def _name(elements: Iterable[Any], called: Callable[[Any], str]) -> None:
                 name = f"{called(element)}_{number}"
             element.name = name
             taken.add(name)
+
+
+def _roots(spec: Any) -> str:
+    """Return the names of the bodies on the world."""
+    names = [body.name for body in spec.bodies if body.name != "world"]
+    roots = [name for name in names if spec.body(name).parent.name == "world"]
+    return ", ".join(map(repr, roots)) or "there is no body"
 
 
 def _add_motors(spec: Any, patterns: Sequence[str]) -> None:

@@ -63,17 +63,10 @@ def recognize(model: Any, roles: Roles) -> Recognized:
     """Return what the motors of a compiled model with named motors are.
 
     Raises:
-        ValueError: there is no free joint, or another joint comes before it; a pattern of ``roles``
-            matches no motor, or one that cannot have that role.
+        ValueError: there is not one free joint, or another joint comes before it; a pattern of
+            ``roles`` matches no motor, or one that cannot have that role.
     """
-    if not model.njnt or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
-        raise ValueError(_no_free_joint(model))
-    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    if len(free) > 1:
-        names = ", ".join(repr(model.body(model.jnt_bodyid[joint]).name) for joint in free)
-        raise ValueError(
-            f"plant.model: {len(free)} bodies have a free joint, {names}: one vehicle flies alone"
-        )
+    _check_bus(model)
     can_be_wheels = {i for i in range(model.nu) if _is_torque_motor(model, i)}
     can_be_thrusters = {i for i in range(model.nu) if _is_force_at_site(model, i)}
     wheels = _chosen(model, "wheels", roles.wheels, can_be_wheels, "torque motors of hinges")
@@ -126,18 +119,20 @@ def places_and_directions(model: Any, thrusters: Sequence[Motor]) -> tuple[Array
     return np.reshape(places, (-1, 3)), np.reshape(ways, (-1, 3))
 
 
-def _no_free_joint(model: Any) -> str:
-    bodies = [model.body(i).name for i in range(1, model.nbody) if model.body_parentid[i] == 0]
-    named = ", ".join(map(repr, bodies)) or "none"
+def _check_bus(model: Any) -> None:
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    if len(free):
-        bus = model.body(model.jnt_bodyid[free[0]]).name
+    names = [model.body(model.jnt_bodyid[joint]).name for joint in free]
+    if len(free) == 1 and free[0] == 0:
+        return
+    if len(free) == 1:
         first = model.joint(0).name
-        return f"plant.model: the joint {first!r} comes before {bus!r}, which is free: put it first"
-    return (
-        f"plant.model: no free joint: the vehicle hangs on the world (by the bodies {named}); give "
-        "its bus a <freejoint/>, or name it as plant.roles.bus, which frees it"
-    )
+        problem = f"the joint {first!r} comes before {names[0]!r}, which is free: put it first"
+    elif len(free) > 1:
+        listed = ", ".join(map(repr, names))
+        problem = f"{len(free)} bodies have a free joint, {listed}: one vehicle flies alone"
+    else:
+        problem = "no free joint: the vehicle hangs on the world"
+    raise ValueError(f"plant.model: {problem}")
 
 
 def _chosen(

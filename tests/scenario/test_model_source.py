@@ -49,13 +49,18 @@ def test_every_file_that_it_refers_to_comes_with_it(tmp_path: Path) -> None:
 
 
 def test_files_of_a_urdf_are_looked_up_without_their_folders(tmp_path: Path) -> None:
-    visual = '<visual><geometry><mesh filename="{}"/></geometry></visual>'
+    visual = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
     robot = '<robot name="r"><link name="bus">{}</link></robot>'
     write(tmp_path, {"a.urdf": robot.format(visual.format("far/away/a.stl")), "a.stl": "a"})
     assert set(read_source("a.urdf", Trust(tmp_path)).files) == {"a.urdf", "a.stl"}
     write(tmp_path, {"b.urdf": robot.format(visual.format("package://x/a.stl"))})
     with pytest.raises(ValueError, match=r"'package://x/a\.stl' is for ROS"):
         read_source("b.urdf", Trust(tmp_path))
+    # MuJoCo does without what is only drawn, and without another simulator's plugins.
+    text = robot.format(visual.format("package://x/b.stl")).replace("collision", "visual")
+    text = text.replace("</robot>", '<plugin filename="libx.so"/></robot>')
+    write(tmp_path, {"c.urdf": text})
+    assert set(read_source("c.urdf", Trust(tmp_path)).files) == {"c.urdf"}
 
 
 @pytest.mark.parametrize("file", ["../secret.stl", "/etc/passwd"])

@@ -92,6 +92,13 @@ def test_its_mass_properties_are_the_models() -> None:
     np.testing.assert_allclose(own.wheel_axes, np.eye(3), atol=1e-15)
 
 
+def test_armature_is_left_out_on_request() -> None:
+    text = SENSED.replace('axis="1 0 0"', 'axis="1 0 0" armature="0.01"')
+    with pytest.raises(ValueError, match="joint 'rw1' has armature"):
+        vehicle(text)
+    assert not vehicle(text, without_armature=True).model.dof_armature.any()
+
+
 def test_what_the_scenario_has_itself_is_replaced() -> None:
     text = SENSED.replace(
         '<option timestep="0.004"/>',
