@@ -87,8 +87,8 @@ class ActuatorSet:
             FlightError: a field of the command is missing or misshapen, or an actuator raises or
                 applies an array of another shape than that of its input.
         """
-        applied, saturated = [], []
         vehicles = len(truth.rate)
+        applied, saturated = list[Array](), [np.zeros((vehicles, 0))]  # of none
         for kind, (takes, width) in zip(self.kinds, self._declared, strict=True):
             _check(command, takes, vehicles)
             after, output, cut = _of(kind, kind.act, state, command, truth, step)

@@ -53,7 +53,7 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
     acting = {
         "/state.physics": block.rows["/state"]["physics"][..., layout.moving],
         **{f"/measurement.{name}": a for name, a in block.rows["/measurement"].items()},
-        **{f"/command.{name}": a for name, a in block.rows["/command"].items()},
+        **{f"/command.{name}": a for name, a in block.rows.get("/command", {}).items()},
     }
     first, culprit = len(block.time), ""
     for name, values in acting.items():

@@ -94,9 +94,10 @@ def files(
     scenario = _scenario(name, source, found)
     texts = {
         f"{name}.toml": tomli_w.dumps(scenario),
-        "law.py": _law(whole, controls="bandwidth" in scenario["law"]),
         f"test_{name.replace('-', '_')}.py": _TEST.substitute(name=name),
     }
+    if scenario["law"]["kind"] == "law.py:Law":
+        texts["law.py"] = _law(whole, controls="bandwidth" in scenario["law"])
     model = {} if source is None else source.files
     return {**model, **{path: text.encode() for path, text in texts.items()}}
 
@@ -105,7 +106,8 @@ def _scenario(name: str, source: ModelSource | None, found: Inspection | None) -
     whole = None if found is None else found.vehicle
     step = 0.005 if found is None else found.step
     control = step * max(1, math.floor(0.01 / step + 1e-9))
-    duration, law = 60.0, {"kind": "law.py:Law"}
+    moved = whole is None or whole.command
+    duration, law = 60.0, {"kind": "law.py:Law" if moved else "coast:Coast"}
     checks: list[dict[str, Any]] = []
     scale = 50.0 if whole is None else float(np.trace(np.array(whole.inertia)))  # kg m^2
     if whole is None or _controls_attitude(whole):

@@ -141,11 +141,12 @@ def test_the_test_that_new_writes_passes(mjspace: Command) -> None:
     assert "1 passed" in tested.stdout, tested.stdout
 
 
-def test_new_for_a_model_without_wheels_commands_nothing(mjspace: Command) -> None:
-    start, end = SENSED.index("<actuator>"), SENSED.index("</actuator>")
-    jet = '<actuator><general name="jet" site="jet" gear="0 0 2 0 0 0"/>'
+@pytest.mark.parametrize("jet", ["", '<general name="jet" site="jet" gear="0 0 2 0 0 0"/>'])
+def test_new_for_a_model_without_wheels_commands_nothing(mjspace: Command, jet: str) -> None:
+    start, end = SENSED.index("<actuator>") + 10, SENSED.index("</actuator>")
     Path("craft.xml").write_text(SENSED[:start] + jet + SENSED[end:])
     assert mjspace("new", "drift", "--model", "craft.xml").status == 0
     flown = mjspace("run", "drift/drift.toml", "--out", "out")
     assert flown.status == 0, flown.out + flown.err
     assert "total momentum drift" in flown.out
+    assert Path("drift/law.py").exists() == bool(jet)

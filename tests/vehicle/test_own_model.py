@@ -182,6 +182,15 @@ def test_a_urdf_gets_a_free_bus_and_wheels(tmp_path: Path) -> None:
     assert verify(result.path, trust=True) is None
 
 
+def test_a_model_without_motors_drifts(tmp_path: Path) -> None:
+    start, end = SENSED.index("<actuator>"), SENSED.index("</actuator>")
+    path = write(tmp_path, SENSED[:start] + "<actuator>" + SENSED[end:])
+    result = run(path, out=tmp_path / "out", overrides=["law={kind='coast:Coast'}"])
+    momentum = result.log.read("/truth", ["momentum"])["momentum"]
+    assert np.abs(momentum - momentum[0]).max() < 1e-9 * np.abs(momentum).max()
+    assert verify(result.path) is None
+
+
 def test_equipment_is_bolted_on_it(tmp_path: Path) -> None:
     path = write(tmp_path)
     law = tmp_path / "law.py"
