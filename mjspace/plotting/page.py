@@ -118,9 +118,7 @@ def _draw(axes: Any, one: Curves, colors: Sequence[str]) -> None:
     if panel.log_scale:
         axes.set_yscale("log")
     else:
-        axes.yaxis.set_major_formatter(
-            lambda value, _: f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
-        )
+        axes.yaxis.set_major_formatter(lambda value, _: _short(value))
     if count > 1:
         axes.legend(
             loc="lower right",
@@ -133,6 +131,15 @@ def _draw(axes: Any, one: Curves, colors: Sequence[str]) -> None:
             borderpad=0.1,
             fontsize=8,
         )
+
+
+def _short(value: float) -> str:
+    """Return a tick's label, for which there is room for some 8 characters."""
+    text = f"{value:.6g}"
+    if value and not 0.999e-3 < abs(value) < 1e6:
+        mantissa, _, exponent = f"{value:.3e}".partition("e")
+        text = f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def _mark(axes: Any, bound: Bound, color: str) -> None:

@@ -14,7 +14,7 @@ from mjspace.log.reader import Log
 from mjspace.plotting import decimate
 from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.plotting.decimate import Line, outlines
-from mjspace.plotting.page import figure, plot
+from mjspace.plotting.page import _short, figure, plot
 from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel, curves, read
 from mjspace.scenario.scenario import Check
 
@@ -276,3 +276,10 @@ def test_bad_input_is_refused(pictured_log: Path, tmp_path: Path) -> None:
         plot(pictured_log, tmp_path / "x.pdf")
     with pytest.raises(ValueError, match=r"truth\.rate"):
         plot(pictured_log, tmp_path / "x.png", signals=["truth.rates"])
+
+
+def test_labels_of_an_axis_are_short_and_exact() -> None:
+    values = (0.0, 0.25, -1.0, 0.001, -0.00025, 7.5e-4, 2e-6, 123456.0, -1.25e7)
+    labels = [_short(value).replace("\N{MINUS SIGN}", "-") for value in values]
+    assert labels == ["0", "0.25", "-1", "0.001", "-2.5e-4", "7.5e-4", "2e-6", "123456", "-1.25e7"]
+    assert [float(label) for label in labels] == list(values)
