@@ -65,6 +65,18 @@ DIPOLE = Input("userdata", columns=range(MOMENT.start, MOMENT.stop))
 """The vehicle's magnetic moment [A m^2], body axes, in the environment's field."""
 
 
+def together(axes: Array, limits: Array) -> Array:
+    """Return what a set with these unit ``axes`` (n, 3) and ``limits`` (n,) has about each, (3,).
+
+    Infinite limits have no share where an axis has none.
+    """
+    shares = np.abs(axes)
+    each = np.broadcast_to(limits[:, None], shares.shape)
+    reach = np.multiply(shares, each, out=np.zeros_like(shares), where=shares > 0.0)
+    total: Array = reach.sum(axis=0)
+    return total
+
+
 class Actuator(ABC):
     """One kind of actuator of a batch of vehicles; all memory is in ``State``.
 

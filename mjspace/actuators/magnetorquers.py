@@ -5,7 +5,7 @@ from math import exp, inf
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mjspace.actuators.base import (
     DIPOLE,
@@ -15,31 +15,45 @@ from mjspace.actuators.base import (
     Fields,
     Input,
     State,
+    together,
 )
 from mjspace.contract import Array, Measurement
 from mjspace.gufunc import gufunc
-from mjspace.scenario.fields import Positive, Si, Table, Time, Unit3
+from mjspace.scenario.fields import (
+    Each,
+    Si,
+    Table,
+    Time,
+    Unit3,
+    of_each,
+    refuse_other_count,
+)
 
 
 class Magnetorquers(ActuatorTable, Table):
-    """Coils whose magnetic moment the Earth's field turns: one for each axis, all alike."""
+    """Coils whose magnetic moment the Earth's field turns: one for each axis."""
 
     axes: Annotated[list[Unit3], Field(min_length=1)] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     """Axes of the coils in body axes, one row for each; normalized."""
-    dipole_limit: Annotated[Positive, Si("A m^2")] | None = None
-    """Largest magnetic moment of each; none when left out."""
+    dipole_limit: Annotated[Each, Si("A m^2")] | None = None
+    """Largest magnetic moment of all or of each; none when left out."""
     time_constant: Time = 0.0
     """With which the moment follows its command."""
+
+    @model_validator(mode="after")
+    def _one_for_each(self) -> "Magnetorquers":
+        refuse_other_count("dipole_limit", self.dipole_limit, len(self.axes), "axes")
+        return self
 
     def actuator(self, context: Context) -> "CoilSet":
         """Return the coils."""
         axes = np.array(self.axes) / np.linalg.norm(self.axes, axis=1, keepdims=True)
-        return CoilSet(axes, self.dipole_limit or inf, self.time_constant)
+        return CoilSet(axes, of_each(self.dipole_limit or inf, len(axes)), self.time_constant)
 
 
 @dataclass(frozen=True)
 class CoilSet(Actuator):
-    """Coils that are all alike, with a pseudo-inverse allocation.
+    """Coils with a pseudo-inverse allocation.
 
     They apply the moment; its torque, moment x field, is the environment's, and changes
     with the attitude in every stage of the integrator.
@@ -47,8 +61,8 @@ class CoilSet(Actuator):
 
     axes: Array
     """Unit axes in body axes, shape (n, 3)."""
-    dipole_limit: float = inf
-    """Largest moment of each [A m^2]."""
+    dipole_limit: Array | float = inf
+    """Largest moment of all or of each [A m^2], shape (n,)."""
     time_constant: float = 0.0
     """With which each follows its command [s]."""
     logged_as: ClassVar[str] = "magnetic_moment"
@@ -60,6 +74,7 @@ class CoilSet(Actuator):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "allocation", np.linalg.pinv(self.axes.T))
+        object.__setattr__(self, "dipole_limit", of_each(self.dipole_limit, len(self.axes)))
 
     @property
     def stateful(self) -> bool:
@@ -72,8 +87,7 @@ class CoilSet(Actuator):
 
     def limits(self) -> dict[str, tuple[Array, Array]]:
         """Return the moment that the coils together have about each axis."""
-        reach = np.abs(self.axes).sum(axis=0)
-        largest = np.multiply(reach, self.dipole_limit, out=np.zeros(3), where=reach > 0.0)
+        largest = together(self.axes, of_each(self.dipole_limit, len(self.axes)))
         return {"dipole": (-largest, largest)}
 
     def act(
@@ -89,27 +103,34 @@ class CoilSet(Actuator):
         kept = exp(-step / self.time_constant) if self.stateful else 0.0
         mean = (1.0 - kept) * self.time_constant / step
         after, moment = _moments.ufunc(
-            command.dipole, before, self.allocation, self.axes, [self.dipole_limit, kept, mean]
+            command.dipole, before, self.allocation, self.axes, self.dipole_limit, [kept, mean]
         )
         return {"coil_moment": after} if self.stateful else {}, moment, np.zeros((len(moment), 0))
 
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
 @gufunc(
-    ["void(f8[:], f8[:], f8[:, :], f8[:, :], f8[:], f8[:], f8[:])"],
-    "(k),(n),(n,k),(n,k),(m)->(n),(k)",
+    ["void(f8[:], f8[:], f8[:, :], f8[:, :], f8[:], f8[:], f8[:], f8[:])"],
+    "(k),(n),(n,k),(n,k),(n),(m)->(n),(k)",
 )
 def _moments(
-    commanded: Any, before: Any, allocation: Any, axes: Any, how: Any, after: Any, moment: Any
+    commanded: Any,
+    before: Any,
+    allocation: Any,
+    axes: Any,
+    limit: Any,
+    how: Any,
+    after: Any,
+    moment: Any,
 ) -> None:
-    limit, kept, mean = how[0], how[1], how[2]
+    kept, mean = how[0], how[1]
     for k in range(commanded.size):
         moment[k] = 0.0
     for i in range(before.size):
         target = 0.0
         for k in range(commanded.size):
             target += allocation[i, k] * commanded[k]
-        target = min(max(target, -limit), limit)
+        target = min(max(target, -limit[i]), limit[i])
         after[i] = target + (before[i] - target) * kept
         applied = target + (before[i] - target) * mean
         for k in range(commanded.size):

@@ -17,11 +17,12 @@ from mjspace.actuators.base import (
     Input,
     State,
     motors,
+    together,
 )
 from mjspace.actuators.wheel_torques import motor_torques
 from mjspace.contract import Array, Measurement
 from mjspace.scenario.equipment import Driven
-from mjspace.scenario.fields import Meters3, Positive, Si, Unit3
+from mjspace.scenario.fields import Each, Meters3, Si, Unit3, of_each, refuse_other_count
 from mjspace.scenario.hinges import Bearing, Friction
 from mjspace.vehicle import mass_properties, model_checks, stability
 from mjspace.vehicle.composition import ASSETS, bus_of
@@ -30,7 +31,7 @@ _GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
 
 
 class Wheels(ActuatorTable, Bearing):
-    """Reaction wheels: one for each axis; every wheel is alike."""
+    """Reaction wheels: one for each axis, alike but for what is a list with a number for each."""
 
     cure: ClassVar[str] = "set wheels.axes = [] to fly without wheels"
     before_parts: ClassVar[bool] = True
@@ -39,26 +40,28 @@ class Wheels(ActuatorTable, Bearing):
     """Spin axes in body axes, one row for each wheel; normalized. None: ``[]``."""
     positions: list[Meters3] | None = None
     """Rotor centres in the body [m]; the centre of mass when left out."""
-    inertia: Annotated[Positive, Si("kg m^2")] = 0.05
+    inertia: Annotated[Each, Si("kg m^2")] = 0.05
     """Axial rotor inertia."""
-    transverse_inertia: Annotated[Positive, Si("kg m^2")] | None = None
+    transverse_inertia: Annotated[Each, Si("kg m^2")] | None = None
     """Transverse rotor inertia; half the axial when left out."""
-    mass: Annotated[Positive, Si("kg")] = 2.0
+    mass: Annotated[Each, Si("kg")] = 2.0
     """Rotor mass."""
-    torque_limit: Annotated[Positive, Si("N m")] | None = None
+    torque_limit: Annotated[Each, Si("N m")] | None = None
     """Largest motor torque; none when left out."""
-    speed_limit: Annotated[Positive, Si("rad/s")] | None = None
+    speed_limit: Annotated[Each, Si("rad/s")] | None = None
     """Largest speed relative to the bus; at it the motor gives no torque that would raise it."""
     allocation: Literal["least_squares", "least_peak"] = "least_squares"
     """Of all motor torques that make the commanded one, those of least norm, or those whose largest
     is least; the latter for one wheel more than the axes span, such as four in a pyramid."""
 
     @model_validator(mode="after")
-    def _alike(self) -> "Wheels":
+    def _one_for_each(self) -> "Wheels":
         if self.positions is not None and len(self.positions) != len(self.axes):
             raise ValueError(
                 f"positions: {len(self.positions)} rows for {len(self.axes)} axes: give as many"
             )
+        for key in ("inertia", "transverse_inertia", "mass", "torque_limit", "speed_limit"):
+            refuse_other_count(key, getattr(self, key), len(self.axes), "axes")
         return self
 
     @property
@@ -72,10 +75,18 @@ class Wheels(ActuatorTable, Bearing):
         axes = np.reshape(np.array(self.axes, dtype=float), (-1, 3))
         axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
         centres = np.zeros_like(axes) if self.positions is None else np.array(self.positions)
-        half = self.inertia / 2.0
-        transverse = half if self.transverse_inertia is None else self.transverse_inertia
-        limit = self.speed_limit or inf
-        return mass_properties.Rotors(axes, centres, self.mass, self.inertia, transverse, limit)
+        count, inertia = len(axes), of_each(self.inertia, len(axes))
+        transverse = inertia / 2.0
+        if self.transverse_inertia is not None:
+            transverse = of_each(self.transverse_inertia, count)
+        return mass_properties.Rotors(
+            axes,
+            centres,
+            of_each(self.mass, count),
+            inertia,
+            transverse,
+            of_each(self.speed_limit or inf, count),
+        )
 
     def attach(self, spec: Any) -> None:
         """Bolt each wheel to the bus, its z axis along the spin axis."""
@@ -101,7 +112,7 @@ class Wheels(ActuatorTable, Bearing):
         """
         vehicle = context.vehicle
         inertia = stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[: len(self.axes)]]
-        limits = self.torque_limit or inf, self.speed_limit or inf
+        limits = of_each(self.torque_limit or inf, len(self.axes)), self.rotors.speed_limit
         wheels = ReactionWheels(vehicle.wheel_axes, *limits, self.allocation, inertia)
         if context.alone:
             wheels.warn_of_unreachable("plant.wheels.axes")
@@ -111,11 +122,12 @@ class Wheels(ActuatorTable, Bearing):
         (name,) = _names(index + 1)[index:]
         part = mujoco.MjSpec.from_file(str(ASSETS / "parts/reaction_wheel/reaction_wheel.xml"))
         rotor, joint, motor = part.body("rotor"), part.joint("spin"), part.actuator("motor")
-        rotor.mass, rotor.ipos, rotor.inertia, rotor.iquat = self._rotor()
+        rotor.mass, rotor.ipos, rotor.inertia, rotor.iquat = self._rotor(index)
         joint.damping = [self.viscous_friction, 0.0, 0.0]  # linear, quadratic, cubic
         if self.torque_limit is not None:
             motor.ctrllimited = True
-            motor.ctrlrange = [-self.torque_limit, self.torque_limit]
+            limit = of_each(self.torque_limit, len(self.axes))[index]
+            motor.ctrlrange = [-limit, limit]
 
         mount = bus_of(spec).add_frame()
         mujoco.mju_quatZ2Vec(mount.quat, axis)
@@ -131,20 +143,21 @@ class Wheels(ActuatorTable, Bearing):
         spec.attach(part, prefix=f"{name}_", frame=mount)
         rotor.name = joint.name = motor.name = motor.target = name
 
-    def _rotor(self) -> mass_properties.Inertial:
-        """Return the mass properties of each rotor, its spin axis along z.
+    def _rotor(self, index: int) -> mass_properties.Inertial:
+        """Return the mass properties of a rotor, its spin axis along z.
 
         Raises:
             ValueError: no rotor has that transverse inertia, or so large a product of inertia.
         """
-        axial, transverse = self.inertia, self.rotors.transverse_inertia
+        rotors = self.rotors
+        axial, transverse = rotors.inertia[index], rotors.transverse_inertia[index]
         if 2.0 * transverse < axial:
             raise ValueError(
                 f"plant.wheels.transverse_inertia: {transverse:g} kg m^2 is less than half the "
                 f"axial {axial:g} kg m^2: no rotor has that"
             )
         balanced = mass_properties.Inertial(
-            self.mass,
+            float(rotors.mass[index]),
             np.zeros(3),
             np.array([transverse, transverse, axial]),
             np.array([1.0, 0.0, 0.0, 0.0]),
@@ -174,8 +187,8 @@ class ReactionWheels(Actuator):
     """Unit spin axes in body axes, shape (n, 3)."""
     torque_limit: Array | float = inf
     """Largest motor torque [N m], of all or of each, shape (n,)."""
-    speed_limit: float = inf
-    """Largest speed relative to the bus [rad/s]."""
+    speed_limit: Array | float = inf
+    """Largest speed relative to the bus [rad/s], of all or of each, shape (n,)."""
     shared_by: Literal["least_squares", "least_peak"] = "least_squares"
     """Of all motor torques that make the commanded one: those of least norm or of least peak."""
     inertia: Array = field(default_factory=lambda: np.zeros(0))
@@ -193,9 +206,10 @@ class ReactionWheels(Actuator):
     unreachable: Array = field(init=False, repr=False)
     """Unit vectors, body axes, about which no wheel gives any torque, shape (3 - rank, 3)."""
     _torque_limits: Array = field(init=False, repr=False)
+    _speed_limits: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if np.isfinite(self.speed_limit) and len(self.inertia) != len(self.axes):
+        if np.isfinite(self.speed_limit).any() and len(self.inertia) != len(self.axes):
             raise ValueError(
                 f"speed_limit needs the inertia of each of the {len(self.axes)} rotors: "
                 f"{len(self.inertia)} found"
@@ -206,7 +220,8 @@ class ReactionWheels(Actuator):
             "unreachable": self._unreachable(),
             "inertia": self.inertia if len(self.inertia) else np.ones(len(self.axes)),
             "names": self.names or _names(len(self.axes)),
-            "_torque_limits": np.broadcast_to(self.torque_limit, len(self.axes)).astype(float),
+            "_torque_limits": of_each(self.torque_limit, len(self.axes)),
+            "_speed_limits": of_each(self.speed_limit, len(self.axes)),
         }
         for name, value in derived.items():
             object.__setattr__(self, name, value)
@@ -214,7 +229,7 @@ class ReactionWheels(Actuator):
     @property
     def stateful(self) -> bool:
         """Whether they act in every integration step: a speed limit does."""
-        return bool(np.isfinite(self.speed_limit))
+        return bool(np.isfinite(self.speed_limit).any())
 
     @property
     def drives(self) -> Input:
@@ -223,10 +238,7 @@ class ReactionWheels(Actuator):
 
     def limits(self) -> dict[str, tuple[Array, Array]]:
         """Return the torque that the wheels together apply about each axis."""
-        shares = np.abs(self.axes)
-        limits = np.broadcast_to(self._torque_limits[:, None], shares.shape)
-        largest = np.multiply(shares, limits, out=np.zeros_like(shares), where=shares > 0.0)
-        largest = largest.sum(axis=0)
+        largest = together(self.axes, self._torque_limits)
         return {"torque": (-largest, largest)}
 
     def act(
@@ -252,7 +264,7 @@ class ReactionWheels(Actuator):
             self.allocation,
             self.spare,
             self._torque_limits,
-            self.speed_limit,
+            self._speed_limits,
             self.inertia,
             self.unreachable,
             step,

@@ -12,8 +12,8 @@ _MISSED = 1e-9, 1e-12
 
 # Products are written out: BLAS may round one vehicle's differently in a batch than alone.
 @gufunc(
-    ["void(f8[:], f8[:], f8[:, :], f8[:], f8[:], f8, f8[:], f8[:, :], f8, f8[:], f8[:])"],
-    "(k),(n),(n,k),(n),(n),(),(n),(u,k),()->(n),(n)",
+    ["void(f8[:], f8[:], f8[:, :], f8[:], f8[:], f8[:], f8[:], f8[:, :], f8, f8[:], f8[:])"],
+    "(k),(n),(n,k),(n),(n),(n),(n),(u,k),()->(n),(n)",
 )
 def motor_torques(
     torque: Any,
@@ -62,9 +62,9 @@ def motor_torques(
         applied = desired
         if abs(applied) > torque_limit[i]:
             applied = np.copysign(torque_limit[i], desired)
-        if speed_limit < np.inf:
-            most = max(speed_limit - speed[i], 0.0) * inertia[i] / step
-            least = min(-speed_limit - speed[i], 0.0) * inertia[i] / step
+        if speed_limit[i] < np.inf:
+            most = max(speed_limit[i] - speed[i], 0.0) * inertia[i] / step
+            least = min(-speed_limit[i] - speed[i], 0.0) * inertia[i] / step
             applied = least if applied < least else most if applied > most else applied
         ctrl[i] = applied
         saturated[i] = 1.0 if applied != desired or beyond else 0.0

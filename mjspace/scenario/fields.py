@@ -19,6 +19,7 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
+from mjspace.contract import Array
 from mjspace.errors import is_file_name, shortened
 from mjspace.ranges import FORMS, Form
 from mjspace.scenario.trust import CommandLineText
@@ -71,6 +72,29 @@ class Interval(Si):
         return super()._validated(value, inner)
 
 
+@dataclass(frozen=True)
+class OneOrEach:
+    """A positive number for all of a set, or a list with one for each."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Validate a single number as a list of one."""
+        each = handler.generate_schema(list[Positive])
+        return core_schema.no_info_wrap_validator_function(
+            self._validated, each, serialization=core_schema.simple_ser_schema("any")
+        )
+
+    def _validated(self, value: Any, inner: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        if isinstance(value, list):
+            return inner(value)
+        try:
+            return inner([value])[0]
+        except ValidationError as error:
+            wrong = error.errors()[0]["msg"].replace("Input should", "should")
+            raise ValueError(f"got {shortened(repr(value))}, {wrong}") from None
+
+
 def of_form(form: Form) -> AfterValidator:
     """Return what refuses an array that is not of that form."""
 
@@ -105,6 +129,8 @@ KindName = Annotated[str, WrapValidator(_marked)]
 FileName = Annotated[str, AfterValidator(_file_name)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
+Each = Annotated[float | list[Positive], OneOrEach()]
+"""Of each of a set: wheels, coils, ....  With its unit behind: ``Annotated[Each, Si("kg")]``."""
 Seconds = Annotated[Positive, Si("s")]
 Period = Annotated[Positive, Field(ge=1e-9), Si("s")]
 """From one instant to another: a log's clock has nanoseconds, in 64 bits."""
@@ -130,6 +156,21 @@ Matrix3 = Annotated[
     Field(min_length=3, max_length=3),
     of_form("inertia"),
 ]
+
+
+def of_each(value: Any, count: int) -> Array:
+    """Return the numbers of each of ``count``, shape (count,), of one for all or one for each."""
+    return np.broadcast_to(value, count).astype(float)
+
+
+def refuse_other_count(key: str, value: Any, count: int, rows: str) -> None:
+    """Refuse a list with another length than the set has.
+
+    Raises:
+        ValueError: with the ``key``; ``rows`` is the key of what there are ``count`` of.
+    """
+    if isinstance(value, list) and len(value) != count:
+        raise ValueError(f"{key}: {len(value)} numbers for {count} {rows}: give one, or as many")
 
 
 class Table(BaseModel):

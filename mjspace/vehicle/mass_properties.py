@@ -27,20 +27,20 @@ class Inertial(NamedTuple):
 
 
 class Rotors(NamedTuple):
-    """Balanced rotors that are all alike, whose axial inertia the papers' H leaves out."""
+    """Balanced rotors, whose axial inertia the papers' H leaves out."""
 
     axes: Array = np.zeros((0, 3))
     """Unit spin axes, body axes, shape (n, 3)."""
     centres: Array = np.zeros((0, 3))
     """Of mass, body axes [m], shape (n, 3)."""
-    mass: float = 0.0
-    """Of each [kg]."""
-    inertia: float = 0.0
-    """Axial, of each [kg m^2]."""
-    transverse_inertia: float = 0.0
-    """About any axis through its centre across the spin axis [kg m^2]."""
-    speed_limit: float = np.inf
-    """Largest speed relative to the bus [rad/s]."""
+    mass: Array = np.zeros(0)
+    """[kg], shape (n,)."""
+    inertia: Array = np.zeros(0)
+    """Axial [kg m^2], shape (n,)."""
+    transverse_inertia: Array = np.zeros(0)
+    """About any axis through its centre across the spin axis [kg m^2], shape (n,)."""
+    speed_limit: Array = np.zeros(0)
+    """Largest speed relative to the bus [rad/s], shape (n,); inf without a limit."""
 
 
 def off_balance(body: Inertial, axis: Array, bearing: Bearing, key: str) -> Inertial:
@@ -94,9 +94,13 @@ def bus(table: PlantTable, wheels: Rotors, own: Array) -> tuple[Inertial, Array]
     """
     axes, centres, mass = wheels.axes, wheels.centres, table.mass
     assert mass is not None  # as in every table but that of a user's own model
-    centre = -wheels.mass * centres.sum(axis=0) / mass
-    offsets = mass * _point(centre) + wheels.mass * np.sum([_point(c) for c in centres], axis=0)
-    across = wheels.transverse_inertia * (len(axes) * np.eye(3) - axes.T @ axes)
+    # By one wheel's times ratios, which of wheels that are alike are exactly 1.
+    heavy, masses = _ratios(wheels.mass)
+    centre = -heavy * (masses[:, None] * centres).sum(axis=0) / mass
+    of_wheels = [ratio * _point(c) for ratio, c in zip(masses, centres, strict=True)]
+    offsets = mass * _point(centre) + heavy * np.sum(of_wheels, axis=0)
+    transverse, ratios = _ratios(wheels.transverse_inertia)
+    across = transverse * (ratios.sum() * np.eye(3) - axes.T @ (ratios[:, None] * axes))
     if table.gyrostat_inertia is None:
         inertia = own if table.bus_inertia is None else np.array(table.bus_inertia)
         gyrostat = inertia + across + offsets
@@ -177,6 +181,12 @@ def _point(r: Array) -> Array:
     return result
 
 
+def _ratios(values: Array) -> tuple[float, Array]:
+    """Return the first of the values, 1 if there are none, and all over it."""
+    first = float(values[0]) if len(values) else 1.0
+    return first, values / first
+
+
 def _too_much(inertia: Array, room: Array, across: Array, wheels: Rotors) -> str:
     """Return what is left of ``room``, and the largest wheels that fit into it."""
     if np.linalg.eigvalsh(room)[0] <= 0.0:
@@ -184,11 +194,13 @@ def _too_much(inertia: Array, room: Array, across: Array, wheels: Rotors) -> str
     else:
         from scipy.linalg import eigh
 
-        fits = wheels.transverse_inertia / eigh(across, room, eigvals_only=True)[-1]
-        cure = (
-            f"use a wheel inertia below {2.0 * fits:.4g} kg m^2"
-            if wheels.transverse_inertia == 0.5 * wheels.inertia
-            else f"use a transverse wheel inertia below {fits:.4g} kg m^2"
-        )
+        share = 1.0 / eigh(across, room, eigvals_only=True)[-1]
+        fits = share * wheels.transverse_inertia.max()
+        if np.ptp(wheels.transverse_inertia):
+            cure = f"use wheels with less than {share:.4g} times their transverse inertia"
+        elif np.array_equal(wheels.transverse_inertia, 0.5 * wheels.inertia):
+            cure = f"use a wheel inertia below {2.0 * fits:.4g} kg m^2"
+        else:
+            cure = f"use a transverse wheel inertia below {fits:.4g} kg m^2"
     left = np.array2string(np.linalg.eigvalsh(inertia), precision=4)
     return f"plant.gyrostat_inertia leaves a bus with the eigenvalues {left} kg m^2: {cure}"

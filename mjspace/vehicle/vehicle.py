@@ -53,8 +53,8 @@ class Vehicle:
     """What of the model its actuators drive, by name."""
     own: Recognized
     """What the motors of a user's own model are; none of another."""
-    speed_limit: float
-    """Largest wheel speed relative to the bus [rad/s]; inf without a limit."""
+    speed_limit: Array
+    """Largest speed of each wheel relative to the bus [rad/s], shape (n,); inf without a limit."""
     momentum: slice
     """In ``sensordata``: total angular momentum about the centre of mass, inertial [N m s]."""
     kinetic: slice
@@ -105,7 +105,7 @@ def build(
     model_checks.check(model)
     driven = Driven.together([own.driven, *_driven(model, table)])
     where = indices.of(model, driven)
-    axes, inertia = rotors.axes, np.full(len(rotors.axes), rotors.inertia)
+    axes, inertia = rotors.axes, rotors.inertia
     if gyrostat is None:
         axes = indices.axes(model, where["wheel_dof"])
         inertia = indices.axial_inertia(model, where["wheel_dof"])
@@ -119,7 +119,7 @@ def build(
         wheel_axes=indices.frozen(axes),
         wheel_inertia=indices.frozen(inertia),
         driven=driven,
-        speed_limit=rotors.speed_limit,
+        speed_limit=indices.frozen(_padded(rotors.speed_limit, len(where["wheel_dof"]))),
         **where,
     )
 
@@ -165,14 +165,21 @@ def initial_state(vehicle: Vehicle, initial: Initial) -> tuple[Array, Array]:
             )
         data.qvel[wheels] = initial.wheel_speed
     _set_joints(vehicle.model, data, initial)
-    fastest, limit = np.abs(data.qvel[wheels]).max(initial=0.0), vehicle.speed_limit
-    if fastest > limit:
-        raise ValueError(
-            f"initial: a wheel starts at {fastest:.6g} rad/s, above plant.wheels.speed_limit "
-            f"{limit:g} rad/s: start slower or raise the limit"
-        )
-    model_checks.check_imbalance(vehicle.model, limit if np.isfinite(limit) else fastest)
+    speeds, limits = np.abs(data.qvel[wheels]), vehicle.speed_limit
+    for speed, limit in zip(speeds, limits, strict=True):
+        if speed > limit:
+            raise ValueError(
+                f"initial: a wheel starts at {speed:.6g} rad/s, above plant.wheels.speed_limit "
+                f"{limit:g} rad/s: start slower or raise the limit"
+            )
+    fastest = np.where(np.isfinite(limits), limits, speeds).max(initial=0.0)
+    model_checks.check_imbalance(vehicle.model, fastest)
     return data.qpos.copy(), data.qvel.copy()
+
+
+def _padded(limits: Array, count: int) -> Array:
+    """Return the limits, which are those of the first of so many wheels; the others have none."""
+    return np.concatenate([limits, np.full(count - len(limits), np.inf)])
 
 
 def _set_joints(model: Any, data: Any, initial: Initial) -> None:

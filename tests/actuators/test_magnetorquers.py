@@ -154,3 +154,11 @@ def test_magnets_need_a_field(overrides: list[str], message: str) -> None:
 def test_an_axis_has_a_direction() -> None:
     with pytest.raises(InputError, match=r"axes\.0: got .* no direction"):
         load("b-dot", ["plant.magnetorquers.axes=[[0, 0, 0]]"])
+
+
+def test_each_coil_has_a_limit_of_its_own() -> None:
+    coils = CoilSet(np.eye(3), np.array([0.2, 0.3, np.inf]))
+    command = SimpleNamespace(dipole=np.array([[1.0, -1.0, 5.0]]))
+    truth = Measurement(rate=np.zeros((1, 3)))
+    _, moment, _ = coils.act({}, command, truth, 0.1)
+    assert moment.tolist() == [[0.2, -0.3, 5.0]]

@@ -203,3 +203,19 @@ def test_a_vehicle_gets_the_same_bits_alone_and_in_a_batch(axes: Any, shared_by:
         one, flag = team.motor_torque(torque[row], speed[row], STEP)
         assert one.tobytes() == ctrl[row].tobytes()
         assert flag.tobytes() == saturated[row].tobytes()
+
+
+def test_each_wheel_has_limits_of_its_own() -> None:
+    team = ReactionWheels(
+        np.eye(3), np.array([0.1, 0.2, np.inf]), np.array([np.inf, 10.0, 20.0]), inertia=np.ones(3)
+    )
+    speed = np.array([0.0, -9.9, 19.95])
+    ctrl, saturated = team.motor_torque(np.array([1.0, 1.0, -1.0]), speed, 1.0)
+    # By its torque limit, by its speed limit, which is nearer, and likewise.
+    np.testing.assert_allclose(ctrl, [-0.1, -0.1, 0.05], atol=1e-14)
+    assert saturated.tolist() == [1.0, 1.0, 1.0]
+    ctrl, saturated = team.motor_torque(np.array([0.05, -0.15, 5.0]), np.zeros(3), 1.0)
+    np.testing.assert_allclose(ctrl, [-0.05, 0.15, -5.0], atol=1e-15)
+    assert not saturated.any()
+    _, largest = team.limits()["torque"]
+    assert largest.tolist() == [0.1, 0.2, np.inf]

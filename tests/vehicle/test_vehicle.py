@@ -334,3 +334,44 @@ def test_an_unknown_part_is_refused_with_those_that_there_are() -> None:
 def test_a_part_s_name_is_an_identifier() -> None:
     with pytest.raises(ValueError, match="pattern"):
         PlantTable(parts={"my damper": Part(part="ring_damper")})
+
+
+def test_wheels_that_are_not_alike_leave_the_vehicle_its_inertia() -> None:
+    inertia, mass = [0.05, 0.08, 0.02, 0.06], [2.0, 3.0, 1.0, 2.5]
+    places = [[0.3, 0.0, 0.1], [0.0, 0.2, 0.0], [-0.1, 0.0, -0.2], [0.0, -0.4, 0.3]]
+    axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]
+    wheels = Wheels.model_validate(
+        {
+            "axes": axes,
+            "positions": places,
+            "inertia": inertia,
+            "mass": mass,
+            "speed_limit": [9] * 4,
+        }
+    )
+    vehicle = build(wheels=wheels)
+    data = mujoco.MjData(vehicle.model)
+    mujoco.mj_forward(vehicle.model, data)
+    matrix = np.zeros((3, vehicle.model.nv))
+    mujoco.mj_angmomMat(vehicle.model, data, matrix, vehicle.model.body("bus").id)
+    of_wheels = vehicle.wheel_axes.T @ (np.array(inertia)[:, None] * vehicle.wheel_axes)
+    np.testing.assert_allclose(matrix[:, 3:6], vehicle.inertia + of_wheels, atol=1e-13)
+    np.testing.assert_allclose(data.subtree_com[1], 0.0, atol=1e-15)
+    assert vehicle.wheel_inertia.tolist() == inertia
+    assert vehicle.model.body("wheel_1").mass[0] == 3.0
+    with pytest.raises(ValueError, match=r"above plant\.wheels\.speed_limit 9 rad/s"):
+        plant.initial_state(vehicle, Initial(wheel_speed=[0.0, 0.0, 9.5, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("inertia", [0.05, 0.05], "inertia: 2 numbers for 3 axes: give one, or as many"),
+        ("mass", [], "mass: 0 numbers for 3 axes"),
+        ("torque_limit", -1, "got -1, should be greater than 0"),
+        ("speed_limit", True, "got True, should be a valid number"),
+    ],
+)
+def test_numbers_of_wheels_that_do_not_fit_are_refused(key: str, value: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Wheels.model_validate({key: value})
