@@ -20,7 +20,6 @@ from mjspace.gufunc import gufunc
 
 from .lander import burning, touched
 from .lander_gains import GimballedEngine
-from .lander_kernels import clipped
 
 
 class State(NamedTuple):
@@ -122,6 +121,16 @@ class ThrustVectoring(GimballedEngine):
 
 
 @njit
+def _clipped(value: Any, low: Any, high: Any) -> Any:
+    """Return ``value`` within limits; NaN stays NaN."""
+    if value < low:
+        return low
+    if value > high:
+        return high
+    return value
+
+
+@njit
 def _to_body(q: Any, v: Any) -> Any:
     """Return R(q)^T v."""
     q0, x, y, z = q
@@ -168,7 +177,7 @@ def _law(
     _, _, ka, kw, rate_limit, _, _, _, reach, period, m, lever, least, most, swing, _, _ = gains
     for i in range(3):
         error[i] = p[i] - p_d[i]
-        integral[i] = before[i] + period * clipped(error[i], -reach, reach)
+        integral[i] = before[i] + period * _clipped(error[i], -reach, reach)
     f = _to_body(q, _desired_force(p, v, p_d, v_d, a_d, before, gains))
     size = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
     pointing[0], pointing[1], pointing[2] = -f[1] / size, f[0] / size, 0.0
@@ -188,9 +197,9 @@ def _law(
     torque_y = J[1, 0] * a[0] + J[1, 1] * a[1] + w[2] * h[0] - w[0] * h[2]
 
     commanded[0] = m * f[2]
-    limited[0] = clipped(commanded[0], least, most)
+    limited[0] = _clipped(commanded[0], least, most)
     # Torque = lever F (sin b1, -cos b1 sin b2, 0).
-    commanded[1] = asin(clipped(torque_x / (lever * limited[0]), -1.0, 1.0))
-    commanded[2] = -asin(clipped(torque_y / (lever * limited[0] * cos(commanded[1])), -1.0, 1.0))
-    limited[1] = clipped(commanded[1], -swing, swing)
-    limited[2] = clipped(commanded[2], -swing, swing)
+    commanded[1] = asin(_clipped(torque_x / (lever * limited[0]), -1.0, 1.0))
+    commanded[2] = -asin(_clipped(torque_y / (lever * limited[0] * cos(commanded[1])), -1.0, 1.0))
+    limited[1] = _clipped(commanded[1], -swing, swing)
+    limited[2] = _clipped(commanded[2], -swing, swing)
