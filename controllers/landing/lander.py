@@ -104,7 +104,8 @@ class VariableStructure(GimballedEngine):
         psi, phi, gamma = components(euler(at.attitude))
         theta_d, _, gamma_d = components(euler(desired.attitude))
         r, dr, theta_error, dtheta, theta = self._cylindrical(at.position, at.velocity, theta_d)
-        r_d, dr_d = _along(desired.position, theta_d), _along(desired.velocity, theta_d)
+        r_d, _ = _horizontal(desired.position, theta_d)
+        dr_d, _ = _horizontal(desired.velocity, theta_d)
         error, climb = at.position - desired.position, at.velocity - desired.velocity
 
         phi_error = phi - np.sin(psi - theta_d) * gamma_d  # before (33)
@@ -138,14 +139,14 @@ class VariableStructure(GimballedEngine):
         (M6).
         """
         if self.coordinates == "frozen":
-            across, dacross = _across(position, theta_d), _across(velocity, theta_d)
-            r, dr = _along(position, theta_d), _along(velocity, theta_d)
+            r, across = _horizontal(position, theta_d)
+            dr, dacross = _horizontal(velocity, theta_d)
             return r, dr, across / self.radius, dacross / self.radius, theta_d
         y, z, _ = components(position)
         r, theta = np.hypot(y, z), np.arctan2(z, y)
-        dr, dtheta = _along(velocity, theta), _across(velocity, theta) / r
+        dr, dacross = _horizontal(velocity, theta)
         share = r / self.radius if self.coordinates == "scaled" else 1.0
-        return r, dr, share * _wrapped(theta - theta_d), share * dtheta, theta
+        return r, dr, share * _wrapped(theta - theta_d), share * dacross / r, theta
 
     def _turned(self, u: Array, c: Array, s: Array) -> Array:
         """Return Rx(alpha) u, (27), with ``c`` and ``s`` of alpha, (..., 3).
@@ -198,16 +199,11 @@ def euler(q: Array) -> Array:
     return -to_euler_zyx(conjugate(q[..., [0, 3, 1, 2]]))
 
 
-def _along(vector: Array, theta: Array) -> Array:
-    """Return the horizontal component at the azimuth ``theta``, (..., 1)."""
+def _horizontal(vector: Array, theta: Array) -> tuple[Array, Array]:
+    """Return the components along and across the azimuth ``theta``, each (..., 1)."""
     y, z, _ = components(vector)
-    return np.cos(theta) * y + np.sin(theta) * z
-
-
-def _across(vector: Array, theta: Array) -> Array:
-    """Return the horizontal component normal to the azimuth ``theta``, (..., 1)."""
-    y, z, _ = components(vector)
-    return np.cos(theta) * z - np.sin(theta) * y
+    c, s = np.cos(theta), np.sin(theta)
+    return c * y + s * z, c * z - s * y
 
 
 def _wrapped(angle: Array) -> Array:
