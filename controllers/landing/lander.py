@@ -16,7 +16,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.algebra import components, dot, times
+from mjspace.algebra import components, times
 from mjspace.attitude import conjugate, to_euler_zyx
 from mjspace.contract import Array, Measurement, ThrustCommand, Trajectory, gain
 
@@ -113,10 +113,11 @@ class VariableStructure(GimballedEngine):
         alpha = psi - theta  # M4, erratum 1
         c, s = np.cos(alpha), np.sin(alpha)
         phi_L, gamma_L = c * phi_error - s * gamma_error, s * phi_error + c * gamma_error  # (25)
-        # z3 to z9 of T X1L, (29), with the signs of T (erratum 12).
+        # z3 to z9 of T X1L, (29), with the signs of T (erratum 12): before (33), the errors of theta
+        # and alpha differ by 2 (theta - theta_d).
         z4, z9 = np.sqrt(2.0) * theta_error, error[..., 2:]
         Z = np.concatenate([r - r_d, z4, -dtheta, dr_d - dr, gamma_L, -phi_L, z9], axis=-1)
-        X2 = np.concatenate([climb[..., 2:], at.rate[..., :2]], axis=-1)  # x', w2, w3
+        X2 = np.concatenate([climb[..., 2:], at.rate[..., :2]], axis=-1)  # x' w2 w3
 
         virtual = self._turned(times(self._feedback, Z), c, s)
         S = self.loop_share * (self.surface_gain * X2 + virtual)  # (33)
@@ -127,9 +128,8 @@ class VariableStructure(GimballedEngine):
         commanded = np.concatenate([thrust, U[..., 1:]], axis=-1)
 
         cut = touched(state.cut, measurement)
-        limited = np.clip(commanded, *self._limits)
         signals = Signals(error, Z, S, commanded[..., :1], commanded[..., :0:-1])
-        return State(cut), burning(cut, limited), signals
+        return State(cut), burning(cut, self.limited(commanded)), signals
 
     def _cylindrical(self, position: Array, velocity: Array, theta_d: Array) -> tuple[Array, ...]:
         """Return r, r', theta - theta_d and theta' as K expects them, and theta, each (..., 1).
@@ -165,11 +165,8 @@ class VariableStructure(GimballedEngine):
         """
         if not self.follows_gravity:
             return self.equilibrium_thrust + U1
-        p_d = desired.position + np.array([0.0, 0.0, self.moon_radius])
-        square = dot(p_d, p_d)
-        gravity = self.gravity_parameter * p_d[..., 2:] / (square * np.sqrt(square))
-        acceleration = desired.linear_acceleration[..., 2:] + gravity + U1
-        thrust: Array = self._mass(propellant) * acceleration / np.maximum(0.5, upright)
+        needed = (desired.linear_acceleration - self.gravity(desired.position))[..., 2:]
+        thrust: Array = self._mass(propellant) * (needed + U1) / np.maximum(0.5, upright)
         return thrust
 
     def _mass(self, propellant: Array) -> Array | float:
@@ -182,12 +179,6 @@ class VariableStructure(GimballedEngine):
     def _feedback(self) -> Array:
         """K, (3, 7)."""
         return lqr_gain() * [[1.0], [1.0], [-1.0]] if self.recomputed else PRINTED
-
-    @cached_property
-    def _limits(self) -> tuple[Array, Array]:
-        """Least and largest [F, b1, b2]."""
-        (least, most), angle = self.thrust_range, self.gimbal_limit
-        return np.array([least, -angle, -angle]), np.array([most, angle, angle])
 
 
 def euler(q: Array) -> Array:

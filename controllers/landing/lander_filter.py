@@ -99,9 +99,10 @@ class Navigation(LunarGravity):
         p, v, q, b, P = self._predicted(estimate, measurement)
         altitude, ground_velocity = measurement.altitude, measurement.ground_velocity
         x = np.zeros_like(P[..., 0])
+        H = np.eye(15)[2:3]
         fresh = altitude != estimate.last_aid[..., :1]
         innovation = altitude - p[..., 2:]
-        x, P = _corrected(x, P, np.eye(15)[2:3], innovation, self.altimeter_noise, fresh)
+        x, P = _corrected(x, P, H, innovation, self.altimeter_noise, fresh)
 
         R_T = transpose(to_matrix(q))
         velocity_b = times(R_T, v)
@@ -128,10 +129,7 @@ class Navigation(LunarGravity):
         f = measurement.specific_force - b[..., :3]
         w = 0.5 * (last_rate + measurement.rate) - b[..., 3:]
         R = to_matrix(multiply(q, from_rotation_vector(0.5 * h * w)))
-        away = p + np.array([0.0, 0.0, self.moon_radius])
-        square = dot(away, away)
-        gravity = -self.gravity_parameter * away / (square * np.sqrt(square))
-        v_ = v + h * (times(R, f) + gravity)
+        v_ = v + h * (times(R, f) + self.gravity(p))
         p_ = p + 0.5 * h * (v + v_)
         q_ = multiply(q, from_rotation_vector(h * w))
 
@@ -142,9 +140,10 @@ class Navigation(LunarGravity):
         A[..., ATTITUDE, ATTITUDE] = -_cross_matrix(w)
         A[..., ATTITUDE, GYRO_BIAS] = -np.eye(3)
         h = h[..., None]
-        phi, (white, walk) = np.eye(15) + h * A, self._noise
-        Q = h**2 * white + h * walk
-        return p_, v_, q_, b, matrix_product(matrix_product(phi, P), transpose(phi)) + Q
+        phi = np.eye(15) + h * A
+        white, walk = self._noise
+        P_ = matrix_product(matrix_product(phi, P), transpose(phi)) + h**2 * white + h * walk
+        return p_, v_, q_, b, P_
 
     def estimated(self, estimate: FilterState, measurement: Measurement) -> Measurement:
         """Return ``measurement`` with position, velocity, attitude and rate as estimated."""
