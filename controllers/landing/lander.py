@@ -113,8 +113,8 @@ class VariableStructure(GimballedEngine):
         alpha = psi - theta  # M4, erratum 1
         c, s = np.cos(alpha), np.sin(alpha)
         phi_L, gamma_L = c * phi_error - s * gamma_error, s * phi_error + c * gamma_error  # (25)
-        # z3 to z9 of T X1L, (29), with the signs of T (erratum 12): before (33), the errors of theta
-        # and alpha differ by 2 (theta - theta_d).
+        # z3 to z9 of T X1L, (29), with the signs of T (erratum 12); the errors of theta and alpha
+        # before (33) differ by 2 (theta - theta_d).
         z4, z9 = np.sqrt(2.0) * theta_error, error[..., 2:]
         Z = np.concatenate([r - r_d, z4, -dtheta, dr_d - dr, gamma_L, -phi_L, z9], axis=-1)
         X2 = np.concatenate([climb[..., 2:], at.rate[..., :2]], axis=-1)  # x' w2 w3
