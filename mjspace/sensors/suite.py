@@ -116,8 +116,8 @@ class SensorSuite:
     def draws(self, periods: Sequence[int]) -> dict[str, Array]:
         """Return what a sample at each of these control instants takes, by sensor and purpose.
 
-        That is its random numbers, (n, N, axes), and 1.0 or 0.0, (n, 1, 1), for whether a sensor is
-        due that samples less often.
+        That is random numbers, (n, N, axes), and, of a sensor that samples less often, 1.0 where it
+        is due and 0.0 elsewhere, (n, 1, 1).
         """
         drawn = {}
         for sensor in self._sampled:
@@ -156,15 +156,19 @@ class SensorSuite:
         return other
 
     def sample_where_due(self, state: State, truth: Measurement) -> tuple[State, Measurement]:
-        """Return (state, measurement) of sensors ``with_errors``, at no sample 0."""
+        """Return (state, measurement) of sensors ``with_errors``, at any control instant but 0.
+
+        Each takes a sample; one that is not due keeps what it held.
+        """
         after = state.copy()
         for sensor in self._sampled:
-            taken = state.copy()
-            self._take(sensor, taken, sensor.period, truth)
-            for name, value in taken.items():
-                if value is not state[name]:
-                    late = sensor.due is not None
-                    after[name] = np.where(sensor.due > 0.5, value, state[name]) if late else value
+            before = after.copy()
+            self._take(sensor, after, sensor.period, truth)
+            if sensor.due is None:
+                continue
+            for name, held in before.items():
+                if after[name] is not held:
+                    after[name] = np.where(sensor.due > 0.5, after[name], held)
         return after, self.report(after, truth)
 
     def _take(self, sensor: "_Sampled", state: State, step_index: int, truth: Measurement) -> None:
@@ -200,7 +204,7 @@ class _Sampled:
     increment: Callable[[int], Array]
     samples_field: str
     walk_field: str
-    due: Any = None  # whether it is, in ``sample_where_due``, (1, 1); None: always
+    due: Any = None  # 1.0 or 0.0, (1, 1), for ``sample_where_due``; None: always
 
     def read(self, state: State, index: int, truth: Array) -> Array:
         """Return what sample ``index`` reports of the ``truth``."""
