@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mjspace import attitude as att
+from mjspace.algebra import times
 from mjspace.contract import Array, Trajectory, gain
 
 from .lander_gains import LunarGravity
@@ -104,8 +105,8 @@ def powered(
     position, velocity, acceleration = motion[:3]
     thrust = _specific_force(motion, gravity_parameter, moon_radius)
     ahead, aside = np.cos(azimuth), np.sin(azimuth)
-    turned = np.array([[ahead, -aside, 0.0], [aside, ahead, 0.0], [0.0, 0.0, 1.0]])
-    f, df, ddf = (part @ turned for part in thrust)
+    turned = np.array([[ahead, aside, 0.0], [-aside, ahead, 0.0], [0.0, 0.0, 1.0]])
+    f, df, ddf = (times(turned, part) for part in thrust)
 
     size = np.linalg.norm(f, axis=-1)
     dsize = _dot(f, df) / size

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mjspace.algebra import times
 from mjspace.contract import Array, Trajectory, gain
 
 from .bezier import curve
@@ -65,8 +66,8 @@ class BezierDescent(LunarGravity):
         for part in motion[2:]:
             part[late > 0.0] = 0.0
         c, s = np.cos(self.azimuth), np.sin(self.azimuth)
-        to_world = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        motion = [part @ to_world for part in motion]
+        to_world = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        motion = [times(to_world, part) for part in motion]
         motion[0] += np.array([0.0, 0.0, self.stance])
         return powered(motion, self.azimuth, self.gravity_parameter, self.moon_radius)
 

@@ -37,6 +37,17 @@ def test_each_is_the_derivative_of_the_one_before(source: Any) -> None:
 
 
 @sources
+def test_an_instant_is_the_same_bits_alone_as_among_others(source: Any) -> None:
+    """A flight asks for as many instants as a block has: that must not show in its numbers."""
+    times = np.linspace(0.0, 1.2 * source.duration, 400)
+    together = source.at(times)
+    for k in range(0, 399, 7):
+        for count in (1, 2):
+            for one, other in zip(source.at(times[k : k + count]), together, strict=True):
+                assert one.tobytes() == other[k : k + count].tobytes()
+
+
+@sources
 def test_its_axis_is_along_the_thrust_that_it_needs(source: Any) -> None:
     wanted = source.at(np.linspace(0.0, 1.2 * source.duration, 50))
     away = wanted.position + np.array([0.0, 0.0, RADIUS])
