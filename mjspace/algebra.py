@@ -10,6 +10,11 @@ from mjspace.contract import Array
 from mjspace.gufunc import gufunc
 
 
+def components(vector: Array) -> list[Array]:
+    """Return the components along the last axis, each of shape (..., 1)."""
+    return [vector[..., k : k + 1] for k in range(vector.shape[-1])]
+
+
 def cross(a: Array, b: Array) -> Array:
     """Return a x b, shape (..., 3)."""
     product: Array = _cross.ufunc(a, b)

@@ -23,6 +23,12 @@ CASES: dict[str, tuple[Callable[..., Array], tuple[Array, ...], Array]] = {
 }
 
 
+def test_components_keep_the_axis_that_they_are_taken_from() -> None:
+    parts = algebra.components(VECTORS)
+    assert [part.shape for part in parts] == [(N, 1)] * 3
+    assert np.concatenate(parts, axis=-1).tobytes() == VECTORS.tobytes()
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_a_product_is_numpys(name: str) -> None:
     function, operands, expected = CASES[name]

@@ -13,7 +13,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.algebra import cross, dot, times, transpose
+from mjspace.algebra import components, cross, dot, times, transpose
 from mjspace.attitude import conjugate, multiply, to_matrix
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
@@ -108,7 +108,7 @@ def _shorter(error: Array) -> Array:
     At 180 deg its scalar is zero and both signs are valid: the sign is then chosen by the vector,
     so that q and -q give the same result.
     """
-    w, x, y, z = (error[..., k : k + 1] for k in range(4))
+    w, x, y, z = components(error)
     first = np.where(w != 0.0, w, np.where(x != 0.0, x, np.where(y != 0.0, y, z)))
     return np.where(first < 0.0, -error, error)
 

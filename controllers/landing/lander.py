@@ -16,11 +16,14 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from mjspace.algebra import components, times
+from mjspace.attitude import conjugate, to_euler_zyx
 from mjspace.contract import Array, Measurement, ThrustCommand, Trajectory, gain
 
-from . import lander_kernels as kernels
 from .lander_gains import GimballedEngine
 from .lander_lqr import PRINTED, lqr_gain
+
+COORDINATES = ("polar", "scaled", "frozen")
 
 
 class State(NamedTuple):
@@ -83,8 +86,8 @@ class VariableStructure(GimballedEngine):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.coordinates not in _COORDINATES:
-            have = ", ".join(_COORDINATES)
+        if self.coordinates not in COORDINATES:
+            have = ", ".join(COORDINATES)
             raise ValueError(f"coordinates: got {self.coordinates!r}, should be one of {have}")
         if not np.all(self.surface_gain):
             raise ValueError(f"surface_gain: got {self.surface_gain}, should have no zero")
@@ -97,42 +100,106 @@ class VariableStructure(GimballedEngine):
         self, state: State, time: float, measurement: Measurement, reference: Trajectory
     ) -> tuple[State, ThrustCommand, Signals]:
         """Return the next state, the thrust and gimbal angles, and the errors."""
-        cut = touched(state.cut, measurement)
         at, desired = measurement, reference
-        Z, S, commanded, limited = kernels.variable_structure.ufunc(
-            at.attitude, at.rate, at.position, at.velocity,
-            desired.attitude, desired.position, desired.velocity, desired.linear_acceleration,
-            *self._gains[:-2], self._engine(at.propellant), self._gains[-1],
-        )  # fmt: skip
-        error = at.position - desired.position
-        signals = Signals(error, Z, S, commanded[..., :1], commanded[..., :0:-1])
-        return State(cut), burning(cut, limited), signals
+        psi, phi, gamma = components(euler(at.attitude))
+        theta_d, _, gamma_d = components(euler(desired.attitude))
+        r, dr, theta_error, dtheta, theta = self._cylindrical(at.position, at.velocity, theta_d)
+        r_d, _ = _horizontal(desired.position, theta_d)
+        dr_d, _ = _horizontal(desired.velocity, theta_d)
+        error, climb = at.position - desired.position, at.velocity - desired.velocity
 
-    def _engine(self, propellant: Array) -> Array:
-        """Return the engine's parameters with the present mass, (..., 8)."""
-        engine: Array = self._gains[-2]
+        phi_error = phi - np.sin(psi - theta_d) * gamma_d  # before (33)
+        gamma_error = gamma - np.cos(psi - theta_d) * gamma_d
+        alpha = psi - theta  # M4, erratum 1
+        c, s = np.cos(alpha), np.sin(alpha)
+        phi_L, gamma_L = c * phi_error - s * gamma_error, s * phi_error + c * gamma_error  # (25)
+        # z3 to z9 of T X1L, (29), with the signs of T (erratum 12); the errors of theta and alpha
+        # before (33) differ by 2 (theta - theta_d).
+        z4, z9 = np.sqrt(2.0) * theta_error, error[..., 2:]
+        Z = np.concatenate([r - r_d, z4, -dtheta, dr_d - dr, gamma_L, -phi_L, z9], axis=-1)
+        X2 = np.concatenate([climb[..., 2:], at.rate[..., :2]], axis=-1)  # x' w2 w3
+
+        virtual = self._turned(times(self._feedback, Z), c, s)
+        S = self.loop_share * (self.surface_gain * X2 + virtual)  # (33)
+        robust = self.robust_gain * np.tanh(self.robust_gain * S / self.smoothing)  # (36)
+        U = -S - robust  # (34)
+        upright = np.cos(phi) * np.cos(gamma)
+        thrust = self._thrust(U[..., :1], upright, desired, at.propellant)
+        commanded = np.concatenate([thrust, U[..., 1:]], axis=-1)
+
+        cut = touched(state.cut, measurement)
+        signals = Signals(error, Z, S, commanded[..., :1], commanded[..., :0:-1])
+        return State(cut), burning(cut, self.limited(commanded)), signals
+
+    def _cylindrical(self, position: Array, velocity: Array, theta_d: Array) -> tuple[Array, ...]:
+        """Return r, r', theta - theta_d and theta' as K expects them, and theta, each (..., 1).
+
+        Scaled: K is designed for r = re; a change of theta at r moves the vehicle by r/re of that
+        at re (M3, erratum 16). Frozen: along the axes at theta_d, since theta is singular at r = 0
+        (M6).
+        """
+        if self.coordinates == "frozen":
+            r, across = _horizontal(position, theta_d)
+            dr, dacross = _horizontal(velocity, theta_d)
+            return r, dr, across / self.radius, dacross / self.radius, theta_d
+        y, z, _ = components(position)
+        r, theta = np.hypot(y, z), np.arctan2(z, y)
+        dr, dacross = _horizontal(velocity, theta)
+        share = r / self.radius if self.coordinates == "scaled" else 1.0
+        return r, dr, share * _wrapped(theta - theta_d), share * dacross / r, theta
+
+    def _turned(self, u: Array, c: Array, s: Array) -> Array:
+        """Return Rx(alpha) u, (27), with ``c`` and ``s`` of alpha, (..., 3).
+
+        Rx mixes axes whose loops have different speeds: it has Ka Rx Ka^-1 instead (M5).
+        """
+        speeds = self.surface_gain if self.mixes_before_turning else np.ones(3)
+        x, u2, u3 = components(u / speeds)
+        turned: Array = speeds * np.concatenate([x, c * u2 + s * u3, c * u3 - s * u2], axis=-1)
+        return turned
+
+    def _thrust(self, U1: Array, upright: Array, desired: Trajectory, propellant: Array) -> Array:
+        """Return F [N] that adds U1 to the equilibrium (M1, erratum 9), (..., 1).
+
+        It is that of the desired motion, or Fe. ``upright`` is the cosine of the tilt.
+        """
+        if not self.follows_gravity:
+            return self.equilibrium_thrust + U1
+        needed = (desired.linear_acceleration - self.gravity(desired.position))[..., 2:]
+        thrust: Array = self._mass(propellant) * (needed + U1) / np.maximum(0.5, upright)
+        return thrust
+
+    def _mass(self, propellant: Array) -> Array | float:
+        """Return m less what is burnt, (..., 1), or m."""
         if not self.tank or not propellant.shape[-1]:
-            return engine
-        left = engine[_MASS] - (self.tank - propellant)
-        others = (
-            np.broadcast_to(part, (*left.shape[:-1], len(part)))
-            for part in (engine[:_MASS], engine[_MASS + 1 :])
-        )
-        return np.concatenate([next(others), left, next(others)], axis=-1)
+            return self.mass
+        return self.mass - (self.tank - propellant)
 
     @cached_property
-    def _gains(self) -> tuple[Array, ...]:
-        feedback = lqr_gain() * [[1.0], [1.0], [-1.0]] if self.recomputed else PRINTED
-        choices = [_COORDINATES[self.coordinates], self.mixes_before_turning, self.follows_gravity]
-        engine = [self.equilibrium_thrust, self.mass, self.radius, self.robust_gain]
-        engine += [self.smoothing, *self.thrust_range, self.gimbal_limit]
-        moon = [self.gravity_parameter, self.moon_radius]
-        numbers = [np.array(part, dtype=float) for part in (choices, engine, moon)]
-        return feedback, numbers[0], self.surface_gain, self.loop_share, *numbers[1:]
+    def _feedback(self) -> Array:
+        """K, (3, 7)."""
+        return lqr_gain() * [[1.0], [1.0], [-1.0]] if self.recomputed else PRINTED
 
 
-_MASS = 1  # index among the engine's parameters
-_COORDINATES = {"polar": kernels.POLAR, "scaled": kernels.SCALED, "frozen": kernels.FROZEN}
+def euler(q: Array) -> Array:
+    """Return psi, phi, gamma [rad] of C = Rz(gamma) Ry(phi) Rx(psi), (..., 3).
+
+    C is (4), from inertial to body axes (erratum 1) of the paper; ``q`` is in our axes. The paper's
+    Rx, Ry and Rz turn axes, those of ``to_euler_zyx`` turn vectors: hence the sign.
+    """
+    return -to_euler_zyx(conjugate(q[..., [0, 3, 1, 2]]))
+
+
+def _horizontal(vector: Array, theta: Array) -> tuple[Array, Array]:
+    """Return the components along and across the azimuth ``theta``, each (..., 1)."""
+    y, z, _ = components(vector)
+    c, s = np.cos(theta), np.sin(theta)
+    return c * y + s * z, c * z - s * y
+
+
+def _wrapped(angle: Array) -> Array:
+    """Return ``angle`` within half a turn of zero."""
+    return angle - 2.0 * np.pi * np.rint(angle / (2.0 * np.pi))
 
 
 def touched(cut: Array, measurement: Measurement) -> Array:

@@ -2,9 +2,10 @@
 
 An extended Kalman filter of the errors of (position, velocity, attitude, accelerometer bias, gyro
 bias); the attitude error is a small rotation in body axes. Sola, "Quaternion kinematics for the
-error-state Kalman filter", 2017, sections 5 and 6. World axes as in ``descent``. No sensor measures
-the horizontal position: its error starts as that of the initial fix and grows with the integrated
-error of the velocimeter.
+error-state Kalman filter", 2017, sections 5.4 and 6, whose reset (6.3) is left out: it changes the
+covariance by the product of two small angles. World axes as in ``descent``. No sensor measures the
+horizontal position: its error starts as that of the initial fix and grows with the integrated error
+of the velocimeter.
 """
 
 from dataclasses import dataclass
@@ -13,10 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mjspace.algebra import cross, dot, matrix_product, times, transpose
+from mjspace.attitude import from_rotation_vector, multiply, normalize, to_matrix
 from mjspace.contract import Array, Measurement, gain
 
-from . import lander_filter_kernels as kernels
 from .lander_gains import LunarGravity
+
+POSITION, VELOCITY, ATTITUDE, FORCE_BIAS, GYRO_BIAS = (slice(k, k + 3) for k in range(0, 15, 3))
+BIAS = slice(9, 15)
+"""Where the errors stand among the 15, as their covariance has them."""
 
 
 class FilterState(NamedTuple):
@@ -90,11 +96,54 @@ class Navigation(LunarGravity):
 
     def navigate(self, estimate: FilterState, measurement: Measurement) -> FilterState:
         """Return the estimates a period later, or at the same instant right after ``fix``."""
-        rate, force = measurement.rate, measurement.specific_force
-        aid = np.concatenate([measurement.altitude, measurement.ground_velocity], axis=-1)
-        found = kernels.predict_and_correct.ufunc(*estimate, rate, force, aid, self._numbers)
-        position, velocity, attitude, bias, covariance = found
-        return FilterState(position, velocity, attitude, bias, covariance, rate.copy(), aid)
+        p, v, q, b, P = self._predicted(estimate, measurement)
+        altitude, ground_velocity = measurement.altitude, measurement.ground_velocity
+        x = np.zeros_like(P[..., 0])
+        H = np.eye(15)[2:3]
+        fresh = altitude != estimate.last_aid[..., :1]
+        innovation = altitude - p[..., 2:]
+        x, P = _corrected(x, P, H, innovation, self.altimeter_noise, fresh)
+
+        R_T = transpose(to_matrix(q))
+        velocity_b = times(R_T, v)
+        H = np.zeros_like(P[..., :3, :])
+        # A rotation theta changes R^T v by velocity_b x theta.
+        H[..., VELOCITY], H[..., ATTITUDE] = R_T, _cross_matrix(velocity_b)
+        changed = ground_velocity != estimate.last_aid[..., 1:]
+        fresh = np.any(changed, axis=-1, keepdims=True)
+        innovation = ground_velocity - velocity_b
+        x, P = _corrected(x, P, H, innovation, self.velocimeter_noise, fresh)
+
+        p, v, b = p + x[..., POSITION], v + x[..., VELOCITY], b + x[..., BIAS]  # section 6.2
+        q = normalize(multiply(q, from_rotation_vector(x[..., ATTITUDE])))
+        aid = np.concatenate([altitude, ground_velocity], axis=-1)
+        return FilterState(p, v, q, b, P, measurement.rate.copy(), aid)
+
+    def _predicted(self, estimate: FilterState, measurement: Measurement) -> tuple[Array, ...]:
+        """Return p, v, q, the biases and P by the inertial sensors, sections 5.4.1 to 5.4.3.
+
+        Of order two in the period h, with the attitude halfway; P of order one.
+        """
+        p, v, q, b, P, last_rate, last_aid = estimate
+        h = np.where(np.isinf(last_aid[..., :1]), 0.0, self.control_period)
+        f = measurement.specific_force - b[..., :3]
+        w = 0.5 * (last_rate + measurement.rate) - b[..., 3:]
+        R = to_matrix(multiply(q, from_rotation_vector(0.5 * h * w)))
+        v_ = v + h * (times(R, f) + self.gravity(p))
+        p_ = p + 0.5 * h * (v + v_)
+        q_ = multiply(q, from_rotation_vector(h * w))
+
+        A = np.zeros_like(P)  # of the errors' equations, section 5.3.3
+        A[..., POSITION, VELOCITY] = np.eye(3)
+        A[..., VELOCITY, ATTITUDE] = -matrix_product(R, _cross_matrix(f))
+        A[..., VELOCITY, FORCE_BIAS] = -R
+        A[..., ATTITUDE, ATTITUDE] = -_cross_matrix(w)
+        A[..., ATTITUDE, GYRO_BIAS] = -np.eye(3)
+        h = h[..., None]
+        phi = np.eye(15) + h * A
+        white, walk = self._noise
+        P_ = matrix_product(matrix_product(phi, P), transpose(phi)) + h**2 * white + h * walk
+        return p_, v_, q_, b, P_
 
     def estimated(self, estimate: FilterState, measurement: Measurement) -> Measurement:
         """Return ``measurement`` with position, velocity, attitude and rate as estimated."""
@@ -105,9 +154,33 @@ class Navigation(LunarGravity):
         )
 
     @cached_property
-    def _numbers(self) -> Array:
-        inertial = [self.accelerometer_noise, self.gyro_noise]
-        walks = [self.accelerometer_walk, self.gyro_walk]
-        aids = [self.altimeter_noise, self.velocimeter_noise]
-        moon = [self.gravity_parameter, self.moon_radius]
-        return np.array([*inertial, *walks, *aids, *moon, self.control_period])
+    def _noise(self) -> tuple[Array, Array]:
+        """Variances that white noise adds, over h^2, and random walks, over h, each (15, 15)."""
+        white = [0.0, self.accelerometer_noise, self.gyro_noise, 0.0, 0.0]
+        walk = [0.0, 0.0, 0.0, self.accelerometer_walk, self.gyro_walk]
+        return np.diag(np.repeat(white, 3) ** 2), np.diag(np.repeat(walk, 3) ** 2)
+
+
+def _corrected(
+    x: Array, P: Array, H: Array, innovation: Array, noise: float, fresh: Array
+) -> tuple[Array, Array]:
+    """Return the errors (..., 15) and P after m measurements, where ``fresh`` (..., 1).
+
+    ``H`` (m, 15) or (..., m, 15) is their sensitivity to the errors, ``innovation`` (..., m)
+    measured less predicted, ``noise`` the standard deviation of each. Section 6.1, one number at a
+    time, since their noises are independent: no matrix is inverted.
+    """
+    for i in range(H.shape[-2]):
+        row = H[..., i, :]
+        PH = times(P, row)
+        K = np.where(fresh, PH / (dot(row, PH) + noise**2), 0.0)
+        x, P = (
+            x + K * (innovation[..., i : i + 1] - dot(row, x)),
+            P - K[..., :, None] * PH[..., None, :],
+        )
+    return x, P
+
+
+def _cross_matrix(a: Array) -> Array:
+    """Return the matrix S(a) of a x b = S(a) b, (..., 3, 3)."""
+    return cross(np.eye(3), a[..., None, :])

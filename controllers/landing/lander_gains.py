@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mjspace.algebra import dot
 from mjspace.contract import Array, Gains, gain
 
 
@@ -15,6 +16,13 @@ class LunarGravity(Gains):
     """mu of the Moon."""
     moon_radius: float = gain("m", default=1.738e6, above=0.0)
     """Distance of the landing site from the Moon's centre."""
+
+    def gravity(self, position: Array) -> Array:
+        """Return the gravity [m/s^2] at a ``position`` [m], both in world axes, (..., 3)."""
+        away = position + np.array([0.0, 0.0, self.moon_radius])
+        square = dot(away, away)
+        gravity: Array = -self.gravity_parameter * away / (square * np.sqrt(square))
+        return gravity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,3 +42,9 @@ class GimballedEngine(LunarGravity):
             raise ValueError(
                 f"thrust_range: got {self.thrust_range} N, should be the least, then the largest"
             )
+
+    def limited(self, commanded: Array) -> Array:
+        """Return ``commanded`` [F, b1, b2] [N, rad] within the engine's limits, (..., 3)."""
+        (least, most), angle = self.thrust_range, self.gimbal_limit
+        low, high = np.array([least, -angle, -angle]), np.array([most, angle, angle])
+        return np.clip(commanded, low, high)

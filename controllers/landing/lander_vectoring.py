@@ -6,21 +6,17 @@ the thrust is not controlled, since a gimballed engine has no torque about it. A
 leading vehicle axes.
 """
 
-# mypy: disable-error-code="no-untyped-call"
 from dataclasses import dataclass
-from functools import cached_property
-from math import asin, cos, hypot, sqrt
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from mjspace.algebra import cross, dot, times
+from mjspace.attitude import conjugate, multiply, rotate
 from mjspace.contract import Array, Measurement, ThrustCommand, Trajectory, gain
-from mjspace.gufunc import gufunc
 
 from .lander import burning, touched
 from .lander_gains import GimballedEngine
-from .lander_kernels import clipped
 
 
 class State(NamedTuple):
@@ -102,95 +98,48 @@ class ThrustVectoring(GimballedEngine):
         self, state: State, time: float, measurement: Measurement, reference: Trajectory
     ) -> tuple[State, ThrustCommand, Signals]:
         """Return the next state, the thrust and gimbal angles, and the errors."""
+        at, desired, w = measurement, reference, measurement.rate
+        error = at.position - desired.position
+        to_body = conjugate(at.attitude)
+        f = rotate(to_body, self._desired_force(at, desired, state.integral))
+        pointing = cross(_THRUST_AXIS, f) / np.sqrt(dot(f, f))
+
+        from_desired = multiply(to_body, desired.attitude)
+        turn = _shortened(self.pointing_gain * pointing, self.turn_limit)
+        rate = rotate(from_desired, desired.rate) + turn
+        spin = rotate(from_desired, desired.acceleration) + self.rate_gain * (rate - w)
+        torque = times(self.inertia, spin) + cross(w, times(self.inertia, w))
+
+        thrust = self.mass * f[..., 2:]
+        # The torque is lever F (sin b1, -cos b1 sin b2, 0).
+        lever = self.lever * np.clip(thrust, *self.thrust_range)
+        b1 = np.arcsin(np.clip(torque[..., :1] / lever, -1.0, 1.0))
+        b2 = -np.arcsin(np.clip(torque[..., 1:2] / (lever * np.cos(b1)), -1.0, 1.0))
+        commanded = np.concatenate([thrust, b1, b2], axis=-1)
+
+        integrated = np.clip(error, -self.integral_reach, self.integral_reach)
         cut = touched(state.cut, measurement)
-        at = measurement
-        error, pointing, commanded, limited, integral = _law.ufunc(
-            at.attitude, at.rate, at.position, at.velocity,
-            *reference, state.integral, self.inertia, self._gains,
-        )  # fmt: skip
+        after = State(cut, state.integral + self.control_period * integrated)
         signals = Signals(error, pointing[..., :2], commanded[..., :1], commanded[..., :0:-1])
-        return State(cut, integral), burning(cut, limited), signals
+        return after, burning(cut, self.limited(commanded)), signals
 
-    @cached_property
-    def _gains(self) -> Array:
-        loops = [self.position_gain, self.velocity_gain, self.pointing_gain, self.rate_gain]
-        limits = [self.turn_limit, np.tan(self.tilt_limit), self.feedback_limit]
-        engine = [self.mass, self.lever, *self.thrust_range, self.gimbal_limit]
-        moon = [self.gravity_parameter, self.moon_radius]
-        integral = [self.integral_gain, self.integral_reach, self.control_period]
-        return np.array([*loops, *limits, *integral, *engine, *moon])
-
-
-@njit
-def _to_body(q: Any, v: Any) -> Any:
-    """Return R(q)^T v."""
-    q0, x, y, z = q
-    # v - q0 t + q_v x t with t = 2 q_v x v.
-    t = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
-    return (
-        v[0] - q0 * t[0] + y * t[2] - z * t[1],
-        v[1] - q0 * t[1] + z * t[0] - x * t[2],
-        v[2] - q0 * t[2] + x * t[1] - y * t[0],
-    )
+    def _desired_force(
+        self, measurement: Measurement, reference: Trajectory, integral: Array
+    ) -> Array:
+        """Return f [m/s^2], world axes, (..., 3), within its limits."""
+        position_error = measurement.position - reference.position
+        velocity_error = measurement.velocity - reference.velocity
+        feedback = self.velocity_gain * velocity_error + self.position_gain * position_error
+        f = reference.linear_acceleration - self.gravity(measurement.position)
+        f = f - _shortened(feedback, self.feedback_limit) - self.integral_gain * integral
+        up = np.maximum(f[..., 2:], self.thrust_range[0] / self.mass)
+        aside = _shortened(f[..., :2], np.tan(self.tilt_limit) * up)
+        return np.concatenate([aside, up], axis=-1)
 
 
-@njit
-def _desired_force(p: Any, v: Any, p_d: Any, v_d: Any, a_d: Any, integral: Any, gains: Any) -> Any:
-    """Return the desired thrust over mass [m/s^2], world axes, (3,)."""
-    kp, kd, _, _, _, tilt_slope, most, ki, _, _, m, _, least, _, _, mu, radius = gains
-    away = (p[0], p[1], radius + p[2])
-    square = away[0] * away[0] + away[1] * away[1] + away[2] * away[2]
-    pull = mu / (square * sqrt(square))
-    back, f = np.empty(3), np.empty(3)
-    for i in range(3):
-        back[i] = kd * (v[i] - v_d[i]) + kp * (p[i] - p_d[i])
-    size = sqrt(back[0] * back[0] + back[1] * back[1] + back[2] * back[2])
-    share = most / max(size, most)
-    for i in range(3):
-        f[i] = a_d[i] + pull * away[i] - share * back[i] - ki * integral[i]
-    if f[2] < least / m:
-        f[2] = least / m
-    side = hypot(f[0], f[1])
-    share = tilt_slope * f[2] / max(side, tilt_slope * f[2])
-    return share * f[0], share * f[1], f[2]
+_THRUST_AXIS = np.array([0.0, 0.0, 1.0])
 
 
-@gufunc(
-    [f"void({'f8[:],' * 11}f8[:,:],{'f8[:],' * 5}f8[:])"],
-    "(q),(v),(v),(v),(q),(v),(v),(v),(v),(v),(v),(v,v),(g)->(v),(v),(v),(v),(v)",
-)
-def _law(
-    q: Any, w: Any, p: Any, v: Any, q_d: Any, w_d: Any, dw_d: Any, p_d: Any, v_d: Any, a_d: Any,
-    before: Any, J: Any, gains: Any,
-    error: Any, pointing: Any, commanded: Any, limited: Any, integral: Any,
-) -> None:  # fmt: skip
-    """Write the errors, [F, b1, b2] before and within the engine's limits, and the integral."""
-    _, _, ka, kw, rate_limit, _, _, _, reach, period, m, lever, least, most, swing, _, _ = gains
-    for i in range(3):
-        error[i] = p[i] - p_d[i]
-        integral[i] = before[i] + period * clipped(error[i], -reach, reach)
-    f = _to_body(q, _desired_force(p, v, p_d, v_d, a_d, before, gains))
-    size = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
-    pointing[0], pointing[1], pointing[2] = -f[1] / size, f[0] / size, 0.0
-    share = rate_limit / max(ka * hypot(pointing[0], pointing[1]), rate_limit)
-
-    # R^T R_d: the reference's rates are in the desired axes.
-    back = (q_d[0], -q_d[1], -q_d[2], -q_d[3])
-    rate_d = _to_body(q, _to_body(back, w_d))
-    spin_d = _to_body(q, _to_body(back, dw_d))
-    a = np.empty(3)
-    for i in range(3):
-        a[i] = spin_d[i] + kw * (rate_d[i] + share * ka * pointing[i] - w[i])
-    h = np.empty(3)
-    for i in range(3):
-        h[i] = J[i, 0] * w[0] + J[i, 1] * w[1] + J[i, 2] * w[2]
-    torque_x = J[0, 0] * a[0] + J[0, 1] * a[1] + w[1] * h[2] - w[2] * h[1]
-    torque_y = J[1, 0] * a[0] + J[1, 1] * a[1] + w[2] * h[0] - w[0] * h[2]
-
-    commanded[0] = m * f[2]
-    limited[0] = clipped(commanded[0], least, most)
-    # Torque = lever F (sin b1, -cos b1 sin b2, 0).
-    commanded[1] = asin(clipped(torque_x / (lever * limited[0]), -1.0, 1.0))
-    commanded[2] = -asin(clipped(torque_y / (lever * limited[0] * cos(commanded[1])), -1.0, 1.0))
-    limited[1] = clipped(commanded[1], -swing, swing)
-    limited[2] = clipped(commanded[2], -swing, swing)
+def _shortened(vector: Array, longest: Array | float) -> Array:
+    """Return the ``vector`` with a length of at most ``longest``, a number or (..., 1)."""
+    return longest / np.maximum(np.sqrt(dot(vector, vector)), longest) * vector

@@ -40,7 +40,7 @@ class Accelerometer(Sensor[Annotated[NonNegative, Si("m/s^2")]]):
 
     def _remember(self, memory: State, name: str, truth: Measurement) -> None:
         velocity, turned = _names(name)
-        memory[velocity], memory[turned] = np.array(truth.velocity), np.array(truth.attitude)
+        memory[velocity], memory[turned] = truth.velocity.copy(), truth.attitude.copy()
 
 
 def _names(name: str) -> tuple[str, str]:

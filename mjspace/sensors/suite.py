@@ -49,7 +49,7 @@ class SensorSuite:
             ValueError: a period is no whole number of integration steps, or a delay no whole number
                 of periods.
         """
-        self._surroundings = surroundings
+        self._surroundings, self._steps = surroundings, rates.steps
         self.measurement = Measurement._with_sensors(
             {name: table.measures for name, table in sensors.items()}
         )
@@ -114,20 +114,30 @@ class SensorSuite:
         """The constant bias of each sensor that is not ideal, (N, axes)."""
         return {sensor.name: sensor.bias for sensor in self._sampled}
 
-    def draws(self, samples: Sequence[int]) -> dict[str, Array]:
-        """Return the random numbers of these ``samples``, (n, N, axes), by sensor and purpose."""
+    def draws(self, periods: Sequence[int]) -> dict[str, Array]:
+        """Return what a sample at each of these control instants takes, by sensor and purpose.
+
+        That is random numbers, (n, N, axes), and, of a sensor that samples less often, 1.0 where it
+        is due and 0.0 elsewhere, (n, 1, 1).
+        """
         drawn = {}
         for sensor in self._sampled:
+            steps = [number * self._steps for number in periods]
+            samples = [step // sensor.period for step in steps]
             if sensor.table.noise_std:
                 drawn[f"{sensor.name}_white"] = np.array([sensor.white(i) for i in samples])
             if sensor.table.bias_walk:
                 drawn[f"{sensor.name}_increment"] = np.array([sensor.increment(i) for i in samples])
+            if sensor.period != self._steps:
+                due = [float(step % sensor.period == 0) for step in steps]
+                drawn[f"{sensor.name}_due"] = np.array(due).reshape(-1, 1, 1)
         return drawn
 
     def with_errors(self, biases: Mapping[str, Any], draws: Mapping[str, Any]) -> "SensorSuite":
-        """Return sensors with these biases, and these random numbers in whichever sample.
+        """Return sensors with these biases, and these draws in whichever sample.
 
-        Both are as ``biases`` and, of one sample, as ``draws`` return them; or they are traced.
+        Both are as ``biases`` and, of one control instant, as ``draws`` return them; or they are
+        traced.
         """
 
         def whichever(name: str) -> Callable[[int], Any]:
@@ -140,10 +150,27 @@ class SensorSuite:
                 bias=biases[sensor.name],
                 white=whichever(f"{sensor.name}_white"),
                 increment=whichever(f"{sensor.name}_increment"),
+                due=draws.get(f"{sensor.name}_due"),
             )
             for sensor in self._sampled
         ]
         return other
+
+    def sample_where_due(self, state: State, truth: Measurement) -> tuple[State, Measurement]:
+        """Return (state, measurement) of sensors ``with_errors``, at any control instant but 0.
+
+        Each takes a sample; one that is not due keeps what it held.
+        """
+        after = state.copy()
+        for sensor in self._sampled:
+            before = after.copy()
+            self._take(sensor, after, sensor.period, truth)
+            if sensor.due is None:
+                continue
+            for name, held in before.items():
+                if after[name] is not held:
+                    after[name] = np.where(sensor.due > 0.5, after[name], held)
+        return after, self.report(after, truth)
 
     def _take(self, sensor: "_Sampled", state: State, step_index: int, truth: Measurement) -> None:
         """Put the sample of this step, and the walk that follows it, into ``state``."""
@@ -178,6 +205,7 @@ class _Sampled:
     increment: Callable[[int], Array]
     samples_field: str
     walk_field: str
+    due: Any = None  # 1.0 or 0.0, (1, 1), for ``sample_where_due``; None: always
 
     def read(self, state: State, index: int, truth: Array) -> Array:
         """Return what sample ``index`` reports of the ``truth``."""

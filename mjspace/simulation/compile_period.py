@@ -93,8 +93,9 @@ class _Tracing(TracedArrays):
         """Return the program of sensors, law and actuators.
 
         Raises:
-            Untraceable: as ``compile_period``; or sensors sample at times of their own.
+            Untraceable: as ``compile_period``; or sensors sample between control instants.
         """
+        self._refuse_samples_between()
         before = tuple(self.sensors.values())
         with self.program.section() as sensing:
             after, measurement = self._sample()
@@ -124,8 +125,7 @@ class _Tracing(TracedArrays):
         """
         if self.assembly.inner:
             raise Untraceable("the law has an inner loop")
-        if any(tick % self.assembly.scenario.rates.steps for tick in self.suite.ticks):
-            raise Untraceable("sensors sample between control instants")
+        self._refuse_samples_between()
         if any(effect.waits for effect in self.effects):
             raise Untraceable("a step effect waits for a signal")
         before = after = tuple(self.sensors.values())
@@ -278,15 +278,14 @@ class _Tracing(TracedArrays):
 
     def _sample(self) -> tuple[Any, Any]:
         """Return what the sensors remember after a sample, and the measurement."""
-        steps = self.assembly.scenario.rates.steps
-        if self.suite.ticks - {steps}:
-            raise Untraceable("sensors sample at other times than the control instants")
-        # Not of sample 0, which integrating sensors begin with.
-        sampled, measurement = self.suite.sample(
-            self.traced_arrays(self.sensors), steps, self._truth()
-        )
+        sensors = self.traced_arrays(self.sensors)
+        sampled, measurement = self.suite.sample_where_due(sensors, self._truth())
         before = tuple(self.sensors.values())
         return self.following(before, tuple(sampled[name] for name in self.sensors)), measurement
+
+    def _refuse_samples_between(self) -> None:
+        if any(tick % self.assembly.scenario.rates.steps for tick in self.suite.ticks):
+            raise Untraceable("sensors sample between control instants")
 
     def _reports(self, measurement: Any) -> list[Recorded]:
         """Return what is recorded of sensors: what they remembered, and the ``measurement``."""

@@ -51,6 +51,7 @@ class CompiledBlocks:
         self._reached = self._proved = -1
         self._members, self._threads = members, threads
         self._stepper, self._law = stepper, law
+        self._integrates = any(each.integrates for each in assembly.scenario.sensors.values())
         self._flight: CompiledFlight | None = None
         self.reason = ", and ".join(
             f"{effect.name}: {effect.not_compiled}"
@@ -96,6 +97,8 @@ class CompiledBlocks:
         """
         count = min(count, self._due(first.number + 1) - first.number)
         if count < 2 or columns.events:  # compiled code has no events, and cannot be held to it
+            return columns, None
+        if first.number == 0 and self._integrates:  # whose sample 0 is unlike the others
             return columns, None
         after = self._after_a_period()
         trouble: FlightError | Interrupted | None = None

@@ -52,6 +52,7 @@ class Program:
 
     def __init__(self) -> None:
         self._memory = np.zeros(MEMORY // 8).view(np.uint8)
+        self._base = int(self._memory.ctypes.data)
         self._used = 0
         self._section: _Section | None = None
         self._failure: Exception | None = None
@@ -150,7 +151,7 @@ class Program:
         """
         shape = operands[-1].shape
         order = np.argsort([-abs(step) for step in operands[-1].strides], kind="stable")
-        views = [np.broadcast_to(each, shape).transpose(order) for each in operands]
+        views = [_broadcast(each, shape).transpose(order) for each in operands]
         for lead, (length, *steps) in _runs(views):
             self._call(ufunc, lead, (length,), steps)
 
@@ -169,7 +170,7 @@ class Program:
                 sizes.setdefault(name, size)
         outer = operands[-1].shape[: operands[-1].ndim - len(cores[-1])]
         whole = [
-            np.broadcast_to(each, outer + each.shape[each.ndim - len(core) :])
+            _broadcast(each, outer + each.shape[each.ndim - len(core) :])
             for each, core in zip(operands, cores, strict=True)
         ]
         for index in np.ndindex(*outer):
@@ -209,7 +210,12 @@ class Program:
         section.calls.append((loop.address, loop.data, first, at, at + len(dimensions)))
 
     def _offset(self, array: _Array) -> int:
-        return int(array.ctypes.data) - int(self._memory.ctypes.data)
+        return int(array.ctypes.data) - self._base
+
+
+def _broadcast(array: _Array, shape: tuple[int, ...]) -> _Array:
+    """Return ``np.broadcast_to`` of it, which takes its time where nothing is to be done."""
+    return array if array.shape == shape else np.broadcast_to(array, shape)
 
 
 def _runs(views: Sequence[_Array]) -> Iterator[tuple[list[_Array], tuple[int, ...]]]:

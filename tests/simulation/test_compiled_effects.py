@@ -9,10 +9,12 @@ import pytest
 from compiled_flights import assembly, assert_same, flown, one_of
 
 from mjspace.environment.install import install_callbacks
+from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation import loop, mujoco_warnings
 from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.initial_state import INTEGRATION, Start, first_start
 from mjspace.simulation.stepper import Stepper
+from mjspace.tracing.inner_loops import Untraceable
 from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
 pytestmark = pytest.mark.filterwarnings(
@@ -160,23 +162,35 @@ class Law(VariableStructure):
 """
 
 
+def without_compiled_sensors(patch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any) -> None:
+        raise Untraceable("a sensor")
+
+    patch.setattr(SensorSuite, "sample_where_due", refuse)
+
+
+SELDOM = "sensors.position.period='60 ms'"
+
+
 @pytest.mark.parametrize(
     ("sensors", "what"),
     [
-        ([], "sensors, actuators and step effects ({}) compiled; law called in Python: a branch"),
+        (True, "sensors, actuators and step effects ({}) compiled; law called in Python: a branch"),
         (
-            ["sensors.position.period='60 ms'"],
-            "actuators and step effects ({}) compiled; sensors and law called in Python: sensors",
+            False,
+            "actuators and step effects ({}) compiled; sensors and law called in Python: a sensor",
         ),
     ],
 )
 def test_a_law_that_is_called_in_python_lands_as_well(
-    sensors: list[str], what: str, tmp_path: Any
+    sensors: bool, what: str, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if not sensors:
+        without_compiled_sensors(monkeypatch)
     (tmp_path / "own.py").write_text(LAW)
     own = "law.kind='own.py:Law'"
     for overrides in (LANDS, CRASHES):
-        built = assembly("lander", *overrides, *sensors, own, folder=tmp_path)
+        built = assembly("lander", *overrides, SELDOM, own, folder=tmp_path)
         compiled, python = flown(built), flown(built, compiled=False)
         effects = "the ground contact, the burning mass"
         assert compiled.compiled.startswith(what.format(effects))
@@ -199,19 +213,22 @@ class Law(VariableStructure):
 
 
 @pytest.mark.parametrize("periods", [2, 3, 40])  # of a block, so that it is in any of them
-@pytest.mark.parametrize("sensors", [[], ["sensors.position.period='60 ms'"]])
+@pytest.mark.parametrize("sensors", [True, False])
 def test_a_law_that_is_called_in_python_is_called_once_where_something_happens(
-    sensors: list[str], periods: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+    sensors: bool, periods: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(loop, "BLOCK_PERIODS", periods)
+    if not sensors:
+        without_compiled_sensors(monkeypatch)
     flights = []
     for compiled in (True, False):
         folder = tmp_path / str(compiled)
         folder.mkdir()
         (folder / "own.py").write_text(COUNTS)
         own = "law.kind='own.py:Law'"
-        built = assembly("lander", *CRASHES, *sensors, own, folder=folder)
+        built = assembly("lander", *CRASHES, SELDOM, own, folder=folder)
         flights.append(flown(built, compiled=compiled))
+    assert ("sensors and law called in Python" in flights[0].compiled) is not sensors
     assert "law called in Python" in flights[0].compiled
     assert len(flights[1].events) >= 2
     assert_same(*flights)

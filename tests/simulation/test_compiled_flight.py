@@ -111,17 +111,12 @@ def test_an_inner_loop_has_the_time_of_each_step_and_the_sensors_last_report(
     assert_same(compiled, flown(built, compiled=False))
 
 
-@pytest.mark.parametrize(
-    ("timing", "reason"),
-    [
-        (["sensors.rate.period='5 ms'"], "other times than the control instants"),
-        (["rates.physics='0.5 ms'", "sensors.rate.period='0.5 ms'"], "between control instants"),
-    ],
-)
-def test_sensors_with_times_of_their_own_sample_then(timing: list[str], reason: str) -> None:
+@pytest.mark.parametrize("period", ["0.5 ms", "1.5 ms"])
+def test_sensors_that_sample_between_control_instants_sample_then(period: str) -> None:
+    timing = ["rates.physics='0.5 ms'", f"sensors.rate.period='{period}'"]
     built = assembly("contraction-noise", "duration=0.1", *timing)
     mixed, python = flown(built), flown(built, compiled=False)
-    assert reason in mixed.compiled
+    assert "sensors sample between control instants" in mixed.compiled
     assert_same(mixed, python)
 
 
@@ -150,8 +145,16 @@ ERRORS = [
 ]
 
 
-def test_sensors_with_errors_are_compiled_and_err_in_each_vehicle_by_itself() -> None:
-    built = assembly("contraction-ideal", *ERRORS, "duration=0.2")
+SELDOM = [
+    "sensors.rate={period='7 ms',noise_std=0.1,bias_walk=0.01,delay='14 ms'}",
+    "sensors.attitude={period='5 ms'}",
+    "sensors.wheel_speed={noise_std=0.5}",
+]
+
+
+@pytest.mark.parametrize("errors", [ERRORS, SELDOM], ids=["errors", "seldom"])
+def test_sensors_are_compiled_and_err_in_each_vehicle_by_itself(errors: list[str]) -> None:
+    built = assembly("contraction-ideal", *errors, "duration=0.2")
     members = (0, 1, 2)
     python = flown(built, members, compiled=False)
     for threads in (1, 2):
@@ -165,9 +168,29 @@ def test_sensors_with_errors_are_compiled_and_err_in_each_vehicle_by_itself() ->
     assert python.bits(1) != python.bits(2)
 
 
-@pytest.mark.parametrize("name", ["contraction-adaptive", "dgvscmg-tracking"])
-def test_any_logged_period_is_a_start(name: str) -> None:
-    built = assembly(name, *SCENARIOS[name])
+def test_a_sensor_holds_what_it_sampled_last() -> None:
+    rate = flown(assembly("contraction-ideal", *SELDOM, "duration=0.2")).rows["/measurement.rate"]
+    changes = np.flatnonzero(np.any(np.diff(rate[:, 0], axis=0), axis=1)) + 1
+    assert changes.tolist() == [*range(21, 200, 7)]  # until 14 ms after the first, that is held
+
+
+def test_an_accelerometer_is_compiled_after_the_sample_that_it_begins_with() -> None:
+    built = assembly("lander-estimated", "duration=2")  # an altimeter of 10 Hz, a law of 50 Hz
+    compiled = flown(built, (0, 1), threads=2)
+    assert compiled.compiled.startswith("compiled: sensors, law, actuators")
+    assert_same(compiled, flown(built, (0, 1), compiled=False))
+
+
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [
+        ("contraction-adaptive", []),
+        ("dgvscmg-tracking", []),
+        ("contraction-ideal", [*SELDOM, "rates.control='1 ms'"]),
+    ],
+)
+def test_any_logged_period_is_a_start(name: str, more: list[str]) -> None:
+    built = assembly(name, *SCENARIOS[name], *more)
     whole, middle = flown(built), 57
     logged: dict[str, dict[str, np.ndarray]] = {"sensor": {}, "actuator": {}, "law": {}}
     for topic, values in whole.rows.items():
@@ -299,14 +322,17 @@ def test_what_a_called_law_returns_may_be_any_numbers(result: str, tmp_path: Pat
     assert_same(called, python)
 
 
+@pytest.mark.parametrize("errors", [ERRORS, SELDOM], ids=["errors", "seldom"])
 @pytest.mark.parametrize("batched", [False, True])
-def test_a_called_law_of_many_vehicles_is_pythons(batched: bool, tmp_path: Path) -> None:
+def test_a_called_law_of_many_vehicles_is_pythons(
+    batched: bool, errors: list[str], tmp_path: Path
+) -> None:
     source = BATCHED.replace('torque.astype(str) + "?"', "0.5 * torque")
     if not batched:
         source = source.replace("batched = True", "batched = False")
     (tmp_path / "own.py").write_text(source)
     law = "law={kind='own.py:Law'}"
-    built = assembly("contraction-noise", "duration=0.1", law, *ERRORS, folder=tmp_path)
+    built = assembly("contraction-noise", "duration=0.1", law, *errors, folder=tmp_path)
     members = (0, 1, 2)
     python = flown(built, members, compiled=False)
     for threads in (1, 2):

@@ -8,7 +8,7 @@ from lander_laws import FIGURE_6, LANDS, LEAST_CORRECTED, MIXED, PRINTED
 from lander_oracle import Flight, Start, fly, slope_of
 from mjspace.controllers.landing import lander_lqr as lqr
 from mjspace.controllers.landing.descent import SineDescent
-from mjspace.controllers.landing.lander_kernels import euler
+from mjspace.controllers.landing.lander import euler
 
 from mjspace.contract import Array
 
