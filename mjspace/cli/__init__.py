@@ -11,7 +11,7 @@ import warnings
 
 import typer
 
-from mjspace.cli import flights, pictures, recovery, scenarios, validation
+from mjspace.cli import flight_software, flights, pictures, recovery, scenarios, validation
 from mjspace.errors import print_warning
 from mjspace.rendering import graphics
 from mjspace.terminal.reporting import report_errors
@@ -29,6 +29,7 @@ app.command()(flights.run)
 app.command()(flights.replay)
 app.command()(pictures.render)
 app.command()(pictures.plot)
+app.command()(flight_software.law_header)
 app.command()(recovery.recover)
 app.command()(validation.validate)
 

@@ -12,7 +12,7 @@ def code_of(log: Log, scenario: Scenario, *, law: bool = True) -> dict[str, byte
     """Return the files of the log that flying its ``scenario`` would run or read, by name.
 
     Those are the files of the reference and the disturbance, where they came from no module, and
-    with ``law`` those of the law.
+    with ``law`` those of the law, which may be a shared library.
 
     Raises:
         ValueError: an attachment is damaged.
@@ -20,7 +20,7 @@ def code_of(log: Log, scenario: Scenario, *, law: bool = True) -> dict[str, byte
     kinds = [scenario.reference.kind, scenario.environment.python or ""]
     kinds += [scenario.law.kind] if law else []
     places = [kind.partition(":")[0] for kind in kinds]
-    files = [place for place in places if place.endswith(".py")]
+    files = [place for place in places if place.endswith((".py", ".so"))]
     folders = tuple(place.partition("/")[0] + "/" for place in files if "/" in place)
     names = [name for name in log.attachments if name in files or name.startswith(folders)]
     return {name: log.attachment(name) for name in names}

@@ -10,11 +10,28 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from mjspace.errors import nearest
+from mjspace.errors import nearest, shortened
 from mjspace.scenario.user_files import load_file
 
 GROUP = "mjspace.controllers"
 """The package of the laws that come with mjspace, and the entry points of those that do not."""
+
+
+def is_library(kind: str) -> bool:
+    """Return whether a law of that ``kind`` is a function of a shared library."""
+    return kind.partition(":")[0].endswith(".so")
+
+
+def function_of(kind: str) -> str:
+    """Return the function that ``"library.so:function"`` names.
+
+    Raises:
+        ValueError: none that C could have.
+    """
+    name = str(kind.partition(":")[2])
+    if not (name.isascii() and name.isidentifier()):
+        raise ValueError(f"{shortened(kind)!r}: write 'library.so:function'")
+    return name
 
 
 class CommandLineText(str):
@@ -45,6 +62,18 @@ class Trust:
         if not (self._trusts(name) or path.resolve().is_relative_to(self.folder.resolve())):
             raise ValueError(f"{name} is outside the scenario's folder: --trust allows that")
         return path
+
+    def library(self, kind: str) -> tuple[Path, str]:
+        """Return the file and the function that ``"library.so:function"`` names.
+
+        Raises:
+            ValueError: it names no function, or a file that may not run or is not there.
+        """
+        name = function_of(kind)
+        path = self.file(type(kind)(kind.partition(":")[0]))
+        if not path.is_file():
+            raise ValueError(f"no file {path}")
+        return path, name
 
     def load(self, kind: str) -> Any:
         """Return the class or function that ``"module:Name"`` or ``"file.py:Name"`` names.
