@@ -71,7 +71,9 @@ def put(language: str, path: Path, text: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
-def test_everything_on_the_page_works(page: str, tmp_path: Path) -> None:
+def test_everything_on_the_page_works(
+    page: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     found = blocks((ROOT / page).read_text())
     assert found
     paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
@@ -80,6 +82,16 @@ def test_everything_on_the_page_works(page: str, tmp_path: Path) -> None:
     tree = linked(tmp_path / "tree") if extends else tmp_path
     if extends:
         environment |= {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def start(command: list[str]) -> None:
+        process = subprocess.Popen(
+            command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
+        )
+        request.addfinalizer(process.wait)
+        request.addfinalizer(process.kill)
+        assert process.stdout is not None
+        with process.stdout:
+            assert process.stdout.readline()  # it is ready
 
     def do(command: list[str]) -> None:
         done = subprocess.run(
@@ -102,7 +114,7 @@ def test_everything_on_the_page_works(page: str, tmp_path: Path) -> None:
                 words = shlex.split(line.removeprefix("$ "), comments=True)
                 own = words[:1] == ["python"] and (tmp_path / words[1]).exists()
                 if line.startswith("$ ") and (own or words[0] in ("mjspace", "cc")):
-                    do(words)
+                    start(words[:-1]) if words[-1] == "&" else do(words)
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ ROOMS = {
     "plotting": "contract errors log scenario signals units",
     "rendering": "attitude contract environment errors log scenario vehicle",
     "simulation": (
-        "actuators attitude contract environment errors interrupts ranges scenario sensors "
+        "actuators attitude contract environment errors interrupts log ranges scenario sensors "
         "signals tracing units vehicle"
     ),
     "runner": "contract errors interrupts log scenario signals simulation units vehicle",

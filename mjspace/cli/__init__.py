@@ -30,6 +30,7 @@ app.command()(flights.replay)
 app.command()(pictures.render)
 app.command()(pictures.plot)
 app.command()(flight_software.law_header)
+app.command()(flight_software.serve_law)
 app.command()(recovery.recover)
 app.command()(validation.validate)
 

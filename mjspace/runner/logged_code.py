@@ -3,9 +3,10 @@
 import hashlib
 from pathlib import Path
 
-from mjspace.errors import InputError
+from mjspace.errors import InputError, shortened
 from mjspace.log.reader import Log
 from mjspace.scenario.scenario import Scenario
+from mjspace.scenario.trust import is_address
 
 
 def code_of(log: Log, scenario: Scenario, *, law: bool = True) -> dict[str, bytes]:
@@ -37,6 +38,19 @@ def require_trust(files: dict[str, bytes]) -> None:
         raise InputError(
             f"log: to fly it again runs code out of the log, {named}: look at it with 'mjspace "
             "info', then give --trust if it is yours"
+        )
+
+
+def refuse_connection(scenario: Scenario) -> None:
+    """Refuse to connect to the law of a log's ``scenario``, where it is in another process.
+
+    Raises:
+        InputError: it is; with its address.
+    """
+    if is_address(scenario.law.kind):
+        raise InputError(
+            f"log: to fly it again needs the law that listened at {shortened(scenario.law.kind)}: "
+            "start it there, then give --trust, which connects to it"
         )
 
 

@@ -33,7 +33,7 @@ class Component(BaseModel):
 
     kind: KindName
     """``"module:Class"`` in controllers/, or ``"file.py:Class"`` in the scenario's folder; of a law
-    also ``"library.so:function"`` there."""
+    also ``"library.so:function"`` there, or ``"tcp://host:port"``."""
 
     @property
     def gains(self) -> dict[str, Any]:

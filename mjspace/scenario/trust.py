@@ -6,6 +6,7 @@ import inspect
 import pkgutil
 from collections.abc import Sequence
 from dataclasses import dataclass
+from ipaddress import ip_address
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,6 +21,11 @@ GROUP = "mjspace.controllers"
 def is_library(kind: str) -> bool:
     """Return whether a law of that ``kind`` is a function of a shared library."""
     return kind.partition(":")[0].endswith(".so")
+
+
+def is_address(kind: str) -> bool:
+    """Return whether a law of that ``kind`` is a process at the other end of a socket."""
+    return "://" in kind
 
 
 def function_of(kind: str) -> str:
@@ -74,6 +80,27 @@ class Trust:
         if not path.is_file():
             raise ValueError(f"no file {path}")
         return path, name
+
+    def address(self, kind: str) -> tuple[str, int]:
+        """Return the host and the port of ``"tcp://host:port"``.
+
+        Raises:
+            ValueError: it is no such address; or another machine's, and the scenario is not
+                trusted.
+        """
+        scheme, _, place = kind.partition("://")
+        host, _, port = place.rpartition(":")
+        host = host.removeprefix("[").removesuffix("]")
+        if scheme != "tcp" or not host:
+            raise ValueError(f"{shortened(kind)!r}: write 'tcp://host:port'")
+        if not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 65536):
+            raise ValueError(f"{shortened(kind)!r}: the port should be from 1 to 65535")
+        if not (self._trusts(kind) or _is_this_machine(host)):
+            raise ValueError(
+                f"{shortened(kind)!r} is another machine, to which the flight's data would go: "
+                "--trust allows that"
+            )
+        return host, int(port)
 
     def load(self, kind: str) -> Any:
         """Return the class or function that ``"module:Name"`` or ``"file.py:Name"`` names.
@@ -142,6 +169,17 @@ def controllers() -> dict[str, str]:
     package = importlib.import_module(GROUP)
     found = pkgutil.walk_packages(package.__path__, f"{GROUP}.")
     return {each.name.rpartition(".")[2]: each.name for each in found if not each.ispkg}
+
+
+def _is_this_machine(host: str) -> bool:
+    """Return whether what is sent to the ``host`` does not leave this machine.
+
+    A name is not looked up: that would be sent already.
+    """
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _entry_points() -> dict[str, str]:

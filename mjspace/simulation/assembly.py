@@ -18,7 +18,7 @@ from mjspace.environment.orbit import orbit_position
 from mjspace.errors import input_error_at
 from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component, Scenario
-from mjspace.scenario.trust import Trust, is_library
+from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import Surroundings
 from mjspace.sensors.suite import SensorSuite
@@ -123,13 +123,11 @@ def assemble(
     *,
     trust: bool = False,
     law_folder: Path | None = None,
-    inner: bool = True,
 ) -> Assembly:
     """Return the scenario's assembly; ``folder`` holds the files that it names.
 
     With ``trust`` it may name files elsewhere and any installed module: see ``Trust``. A law from
-    ``law_folder``, where there is one, is trusted. Without ``inner`` the actuators are commanded
-    once in a control period, also where the law has an inner loop.
+    ``law_folder``, where there is one, is trusted.
 
     Raises:
         InputError: a part cannot be built, with the scenario's key and what would be right.
@@ -141,6 +139,11 @@ def assemble(
 
         still = without_law(scenario, folder, trust=trust)
         return shared_library.fly_under(still, scenario.law, of_law)
+    if is_address(scenario.law.kind):
+        from mjspace.simulation.flight_software import socket_law
+
+        still = without_law(scenario, folder, trust=trust)
+        return socket_law.fly_under(still, scenario.law, of_law)
     size = userdata_size(scenario.environment, scenario.plant)
     vehicle = _part("plant", partial(build, userdata=size), scenario.plant, scenario.rates)
     facts = facts_of(vehicle, scenario)
@@ -149,7 +152,7 @@ def assemble(
     law, flown["law"] = _component("law", scenario.law, facts, of_law, sources)
     reference, flown["reference"] = _component("reference", scenario.reference, facts, own, sources)
     _part("reference", reference.at, np.array([0.0, scenario.duration]))
-    inner = inner and _part("law", _has_inner_loop, law)
+    inner = _part("law", _has_inner_loop, law)
     disturbance = None
     kind = scenario.environment.python
     if kind is not None:
