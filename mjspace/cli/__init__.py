@@ -31,6 +31,7 @@ app.command()(pictures.render)
 app.command()(pictures.plot)
 app.command()(flight_software.law_header)
 app.command()(flight_software.serve_law)
+app.command()(flight_software.linearize)
 app.command()(recovery.recover)
 app.command()(validation.validate)
 

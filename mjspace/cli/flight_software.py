@@ -1,4 +1,4 @@
-"""The commands ``mjspace law-header`` and ``mjspace serve-law``."""
+"""The commands ``mjspace law-header``, ``mjspace serve-law`` and ``mjspace linearize``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -71,3 +71,21 @@ def serve_law(
 
     with input_error_at("serve-law"):
         serve(component(law, gains), host, port, folder=Path(), tell=tell)
+
+
+def linearize(
+    scenario: Scenario,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", "--out", help="A file for NumPy: plant.npz.")
+    ],
+    overrides: Set = [],  # noqa: B006
+    trust: Trust = False,
+) -> None:
+    """Linearize the vehicle about its initial state: A, B, C, D, and Ad, Bd of a control period."""
+    from mjspace.simulation.linearization import linearize as linearized
+
+    plant = linearized(scenario, overrides, trust=trust)
+    plant.save(output)
+    print(f"plant   {output}")
+    for name in ("states", "inputs", "outputs"):
+        print(f"{name:7} {', '.join(getattr(plant, name))}")
