@@ -1,9 +1,9 @@
 """The command line: ``list``, ``info``, ``run``, ``replay``, ``render``, ``plot``, ``validate``.
 
-``recover`` saves what is whole of a damaged log. Exit status: 0 every check came out as the
-scenario expects, 1 flown but one did not (or a replay differed, or the flight ended early), 2 bad
-input. Modules are imported when a command needs them:
-``--help`` answers at once.
+``law-header``, ``serve-law`` and ``linearize`` are for flight software; ``recover`` saves what is
+whole of a damaged log. Exit status: 0 every check came out as the scenario expects, 1 flown but one
+did not (or a replay differed, or the flight ended early), 2 bad input. Modules are imported when a
+command needs them: ``--help`` answers at once.
 """
 
 import sys

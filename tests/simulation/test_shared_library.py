@@ -190,6 +190,16 @@ def test_a_library_that_returns_an_error_ends_the_flight(page: Path) -> None:
     assert len(result.log.read("/command")["time"]) == 1
 
 
+def test_so_does_one_whose_reset_returns_an_error(page: Path) -> None:
+    text = "int attitude_law_reset(const mjspace_input *in, mjspace_state *state) {"
+    text = f"\n{text} return in == 0 || state != 0; }}\nint attitude_law("
+    changed(page, "unready", ("\nint attitude_law(", text))
+    overrides = ["law.kind=unready.so:attitude_law", *table()]
+    with pytest.raises(FlightError, match="the law's attitude_law_reset returned 1, which is not"):
+        run(page / "attitude_law.toml", overrides=overrides, out=page / "unready")
+    assert not (page / "unready").exists()
+
+
 def test_a_command_that_is_not_finite_ends_the_flight(page: Path) -> None:
     changed(page, "nan", ("-in->gains.attitude_gain", "0.0 / 0.0 * in->gains.attitude_gain"))
     overrides = ["law.kind=nan.so:attitude_law", *table()]

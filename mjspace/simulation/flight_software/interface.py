@@ -61,24 +61,43 @@ class Interface:
 
 def interface_of(assembly: Assembly) -> Interface:
     """Return the interface of flight software for the scenario that was assembled."""
-    scenario, actuators = assembly.scenario, assembly.actuators
+    facts = {
+        name: np.asarray(value, dtype=float)
+        for name, value in facts_of(assembly.vehicle, assembly.scenario).items()
+    }
+    about = docstrings(Vehicle) | _PERIODS
+    vehicle = {
+        name: Field(value.shape, _unit_in(about.get(name, "")), _sentence(about.get(name, "")))
+        for name, value in facts.items()
+    }
+    return Interface(vehicle, _measured(assembly), _desired(assembly), _commanded(assembly), facts)
+
+
+def _measured(assembly: Assembly) -> dict[str, Field]:
+    """Return what is measured: the sensors, in the scenario's order, and what the plant reports."""
     measurement = Stepper(assembly, first_start(assembly, [0])).sense(0).measurement
-    measured: dict[str, Field] = {}
     units, about = units_of(Measurement), docstrings(Measurement)
-    for name in dict.fromkeys([*scenario.sensors, *REPORTED_BY_PLANT]):
-        values, sensor = getattr(measurement, name), scenario.sensors.get(name)
+    of_actuators = assembly.actuators.units["/measurement"]
+    found = {}
+    for name in dict.fromkeys([*assembly.scenario.sensors, *REPORTED_BY_PLANT]):
+        sensor = assembly.scenario.sensors.get(name)
         quantity = name if sensor is None else sensor.measures
-        unit = actuators.units["/measurement"].get(name, "")
-        if quantity in units:
-            unit = units[quantity].si
-        elif sensor is not None:
-            unit = sensor.unit
-        text = _sentence(about.get(quantity, quantity.replace("_", " ")))
-        measured[name] = Field(values.shape[1:], unit, text, quantity)
+        unit = of_actuators.get(name, "") if sensor is None else sensor.unit
+        found[name] = Field(
+            getattr(measurement, name).shape[1:],
+            units[quantity].si if quantity in units else unit,
+            _sentence(about.get(quantity, quantity.replace("_", " "))),
+            quantity,
+        )
+    return found
+
+
+def _desired(assembly: Assembly) -> dict[str, Field]:
+    """Return the fields of the reference."""
     desired = reference_at(assembly.reference, np.zeros(1))
     units = units_of(type(desired))
     about = docstrings(Trajectory) | docstrings(Reference)
-    reference = {
+    return {
         name: Field(
             np.shape(rows)[1:],
             units[name].si if name in units else "",
@@ -86,24 +105,18 @@ def interface_of(assembly: Assembly) -> Interface:
         )
         for name, rows in desired._asdict().items()
     }
+
+
+def _commanded(assembly: Assembly) -> dict[str, Field]:
+    """Return the fields that the actuators obey."""
     about = {name: text for kind in _COMMANDS for name, text in docstrings(kind).items()}
-    command = {
+    return {
         name: Field(
             (size,) if isinstance(size, int) else size, unit, _sentence(about.get(name, ""))
         )
-        for kind in actuators.kinds
+        for kind in assembly.actuators.kinds
         for name, (size, unit) in kind.takes.items()
     }
-    facts = {
-        name: np.asarray(value, dtype=float)
-        for name, value in facts_of(assembly.vehicle, scenario).items()
-    }
-    about = docstrings(Vehicle) | _PERIODS
-    vehicle = {
-        name: Field(value.shape, _unit_in(about.get(name, "")), _sentence(about.get(name, "")))
-        for name, value in facts.items()
-    }
-    return Interface(vehicle, measured, reference, command, facts)
 
 
 def named_tuple(name: str, fields: Fields) -> type:

@@ -81,11 +81,15 @@ class LibraryLaw:
         }
 
     def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
-        """Return the state at the start of a flight: zero, or what ``<function>_reset`` makes."""
+        """Return the state at the start of a flight: zero, or what ``<function>_reset`` makes.
+
+        Raises:
+            ReturnError: that returned anything but 0.
+        """
         self._state[:] = 0.0
         if self._reset is not None:
             self._tell(0.0, measurement, reference)
-            self._reset(*self._pointers[:2])
+            self._refuse(self._reset(*self._pointers[:2]), f"{self._function}_reset")
         return self._copy("state")
 
     def step(
@@ -100,9 +104,7 @@ class LibraryLaw:
         for view, values in zip(self._returned["state"][1], state, strict=True):
             view[...] = values
         self._output[:] = 0.0
-        status = self._step(*self._pointers)
-        if status:
-            raise ReturnError(f"the law's {self._function} returned {status}, which is not 0")
+        self._refuse(self._step(*self._pointers), self._function)
         return self._copy("state"), self._copy("command"), self._copy("signals")
 
     def _tell(self, time: float, measurement: Measurement, reference: DesiredMotion) -> None:
@@ -112,6 +114,10 @@ class LibraryLaw:
             view[...] = getattr(measurement, name)
         for name, view in self._desired:
             view[...] = getattr(reference, name)
+
+    def _refuse(self, status: int, function: str) -> None:
+        if status:
+            raise ReturnError(f"the law's {function} returned {status}, which is not 0")
 
     def _copy(self, struct: str) -> Any:
         kind, views = self._returned[struct]

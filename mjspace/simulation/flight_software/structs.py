@@ -142,7 +142,8 @@ extern const char mjspace_law_layout[];
    is the one that it left at the instant before. Returns 0; any other number ends the flight. */
 int {function}(const mjspace_input *input, mjspace_state *state, mjspace_output *output);
 
-/* Optional: called once before, with the first input; state is zero, and stays so without it. */
+/* Optional: called once before, with the first input, to change state, which is zero. Returns
+   likewise. */
 int {function}_reset(const mjspace_input *input, mjspace_state *state);
 
 #ifdef __cplusplus
