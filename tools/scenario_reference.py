@@ -86,7 +86,10 @@ its range. Arrays may come from a CSV file: `file = "turn.csv"`, with a header t
 
 A law in a file of your own may import modules beside it, at the top of the file, and read data
 files beside it that it lists: `DATA_FILES = ("table.csv",)`, found from `Path(__file__).parent`.
-They all go into the log, from which the flight is replayed without the folder."""
+They all go into the log, from which the flight is replayed without the folder.
+
+A law in a shared library has the keys `state` and `signals`, one in another process `timeout`: see
+[flight software](flight_software.md)."""
     return [*lines, closing, ""]
 
 

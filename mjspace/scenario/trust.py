@@ -93,7 +93,7 @@ class Trust:
         host = host.removeprefix("[").removesuffix("]")
         if scheme != "tcp" or not host:
             raise ValueError(f"{shortened(kind)!r}: write 'tcp://host:port'")
-        if not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 65536):
+        if not (port.isascii() and port.isdigit() and len(port) < 6 and 0 < int(port) < 65536):
             raise ValueError(f"{shortened(kind)!r}: the port should be from 1 to 65535")
         if not (self._trusts(kind) or _is_this_machine(host)):
             raise ValueError(

@@ -330,6 +330,14 @@ ENDS = {
         answering({"command": ZERO, "signals_fields": [CLASSES["Field"](name="round_trip")]}),
         "has a signal 'round_trip', which the flight measures itself",
     ),
+    "two fields": (
+        answering({"command": ZERO, "signals_fields": 2 * [CLASSES["Field"](name="x")]}),
+        "declares two fields of one name",
+    ),
+    "large fields": (
+        answering({"command": ZERO, "signals_fields": [CLASSES["Field"](shape=[4000000000])]}),
+        "declares fields of more than 1048576 bytes",
+    ),
     "another command": (
         answering({"command": ZERO, "command_fields": [CLASSES["Field"](name="x", shape=[3])]}),
         r"the law's command, a Command, has no field 'torque': it must be of shape \(\.\.\., 3\)",
@@ -428,6 +436,7 @@ BAD = {
     "tcp://127.0.0.1:{port}": r"law: no law listens at tcp://\S+: Connection refused \(mjspace ser",
     "tcp://127.0.0.1:0": "the port should be from 1 to 65535",
     "tcp://127.0.0.1:70000": "the port should be from 1 to 65535",
+    "tcp://127.0.0.1:0005555000": "the port should be from 1 to 65535",
     "tcp://127.0.0.1:x": "the port should be from 1 to 65535",
     "tcp://127.0.0.1": "law: 'tcp://127.0.0.1': write 'tcp://host:port'",
     "tcp://:5555": "law: 'tcp://:5555': write 'tcp://host:port'",
@@ -457,6 +466,7 @@ def test_an_address_that_is_none_is_refused_in_one_line(
     [
         ("gian=4", r"law: gian: own\.py:Law has no such key: did you mean 'gain'"),
         ("gain='4 s'", "law: gain: got '4 s', but own.py:Law declares no unit"),
+        ("gain=2026-11-29", r"law: gains: got {'gain': datetime\.date.*should be numbers, texts"),
         ("gain=text", "law: gain: got 'text', should be a number"),
         ("file='/etc/passwd'", "law: /etc/passwd is outside the scenario's folder"),
         ("gain={kind='os:system'}", "law: gain: no module 'os' in mjspace"),

@@ -25,6 +25,7 @@ from google.protobuf.message_factory import GetMessageClass
 
 from mjspace.contract import Array
 from mjspace.log.encoding import doubles
+from mjspace.log.limits import ROW
 from mjspace.log.schema import file_of
 from mjspace.simulation.flight_software.interface import Field, Fields
 
@@ -174,8 +175,17 @@ def declared(fields: Fields) -> list[Any]:
 
 
 def fields_in(messages: Sequence[Any]) -> dict[str, Field]:
-    """Return the fields that ``Field`` messages declare."""
-    return {m.name: Field(tuple(m.shape), m.unit, m.about, m.measures) for m in messages}
+    """Return the fields that ``Field`` messages declare.
+
+    Raises:
+        PeerError: two have one name, or they are larger than a log's row may be.
+    """
+    found = {m.name: Field(tuple(m.shape), m.unit, m.about, m.measures) for m in messages}
+    if len(found) < len(messages):
+        raise PeerError("declares two fields of one name")
+    if sum(8 * prod(field.shape) for field in found.values()) > ROW:
+        raise PeerError(f"declares fields of more than {ROW} bytes")
+    return found
 
 
 def descriptors(groups: Sequence[Numbers]) -> bytes:

@@ -105,7 +105,7 @@ class SocketLaw:
         vehicle = Numbers("Vehicle", interface.vehicle)
         groups = [vehicle, self._measurement, self._reference, Numbers("Command", self._command)]
         begin = CLASSES["Begin"](
-            gains=json.dumps(gains),
+            gains=_in_json(gains),
             vehicle_fields=declared(interface.vehicle),
             measurement_fields=declared(interface.measurement),
             reference_fields=declared(interface.reference),
@@ -200,6 +200,16 @@ class SocketLaw:
                 raise PeerError(f"has a signal {ROUND_TRIP!r}, which the flight measures itself")
             everything[ROUND_TRIP] = Field((1,), "s")
         return Numbers(name.capitalize(), fields), named_tuple(name.capitalize(), everything)
+
+
+def _in_json(gains: dict[str, Any]) -> str:
+    """Return the gains in JSON; ValueError for a kind of value that it does not have, a date."""
+    try:
+        return json.dumps(gains)
+    except TypeError:
+        raise ValueError(
+            f"gains: got {shortened(str(gains))}, should be numbers, texts, lists and tables"
+        ) from None
 
 
 def _seconds(value: Any) -> float:
