@@ -2,6 +2,7 @@
 
 The command line's words from Python: ``list_scenarios()``, ``load(scenario)``, ``run(scenario)``,
 ``replay(log, out)``, ``verify(log)``, ``plot(log, file)``, ``figure(log)``, ``render(log, file)``.
+``linearize(scenario)`` gives the matrices of its vehicle.
 ``Log(path)`` reads a log as NumPy arrays. Where a log is an argument, its path or a ``Log`` may be.
 """
 
@@ -21,6 +22,7 @@ __version__ = "0.1.0"
 _MODULES = {
     "Log": "mjspace.log.reader",
     "figure": "mjspace.plotting.page",
+    "linearize": "mjspace.simulation.linearization",
     "list_scenarios": "mjspace.scenario.files",
     "load": "mjspace.scenario.loading",
     "plot": "mjspace.plotting.page",
@@ -33,6 +35,7 @@ _MODULES = {
 __all__ = [
     "Log",
     "figure",
+    "linearize",
     "list_scenarios",
     "load",
     "plot",

@@ -5,6 +5,7 @@ import os
 import re
 import runpy
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -16,11 +17,11 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import pytest
+from pages import blocks
 
 import mjspace
 
 ROOT = Path(__file__).parents[1]
-FENCE = re.compile(r'^```(\w+)(?: title="(\S+)")?\n(.*?)^```$', re.M | re.S)
 PAGES = [
     page.relative_to(ROOT).as_posix()
     for page in [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]
@@ -70,15 +71,27 @@ def put(language: str, path: Path, text: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
-def test_everything_on_the_page_works(page: str, tmp_path: Path) -> None:
-    blocks = FENCE.findall((ROOT / page).read_text())
-    assert blocks
+def test_everything_on_the_page_works(
+    page: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    found = blocks((ROOT / page).read_text())
+    assert found
     paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
     environment = os.environ | {"PATH": os.pathsep.join(paths)}
-    extends = any(name.partition("/")[0] in PACKAGES for _, name, _ in blocks)
+    extends = any(name.partition("/")[0] in PACKAGES for _, name, _ in found)
     tree = linked(tmp_path / "tree") if extends else tmp_path
     if extends:
         environment |= {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def start(command: list[str]) -> None:
+        process = subprocess.Popen(
+            command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
+        )
+        request.addfinalizer(process.wait)
+        request.addfinalizer(process.kill)
+        assert process.stdout is not None
+        with process.stdout:
+            assert process.stdout.readline()  # it is ready
 
     def do(command: list[str]) -> None:
         done = subprocess.run(
@@ -86,7 +99,7 @@ def test_everything_on_the_page_works(page: str, tmp_path: Path) -> None:
         )
         assert done.returncode == 0, (command, done.stdout, done.stderr)
 
-    for language, name, text in blocks:
+    for language, name, text in found:
         folder, _, rest = name.partition("/")
         if folder in PACKAGES:
             put(language, tree / PACKAGES[folder] / rest, text)
@@ -96,8 +109,12 @@ def test_everything_on_the_page_works(page: str, tmp_path: Path) -> None:
             do([sys.executable, "-c", text])
         elif language == "console":
             for line in text.splitlines():
-                if line.startswith("$ mjspace"):
-                    do(shlex.split(line.removeprefix("$ "), comments=True))
+                if line.startswith("$ cc ") and shutil.which("cc") is None:
+                    pytest.skip("the page compiles C, and there is no compiler")
+                words = shlex.split(line.removeprefix("$ "), comments=True)
+                own = words[:1] == ["python"] and (tmp_path / words[1]).exists()
+                if line.startswith("$ ") and (own or words[0] in ("mjspace", "cc")):
+                    start(words[:-1]) if words[-1] == "&" else do(words)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +141,7 @@ def test_the_rooms_shown_are_those_of_the_imports() -> None:
 def test_files_and_modules_that_a_page_names_are_there(page: Path) -> None:
     # What a recipe adds is not there yet, and what moved is no longer there.
     text = re.sub(r"^\| `mjspace\.\S+` (?=\| `mjspace)", "", page.read_text(), flags=re.M)
-    added = {name for _, name, _ in FENCE.findall(text) if name}
+    added = {name for _, name, _ in blocks(text) if name}
     modules = tuple(name.removesuffix(".py").replace("/", ".") for name in added)
     for path in re.findall(r"`((?:mjspace|controllers|tests|tools)/[\w/]+\.\w+)`", text):
         assert (ROOT / path).exists() or path in added, path

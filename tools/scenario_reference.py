@@ -1,13 +1,10 @@
 """Write docs/scenario.md from the typed scenario, so that the page cannot say anything else."""
 
-import ast
 import inspect
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
 from datetime import datetime
-from functools import cache
 from importlib import import_module
-from itertools import pairwise
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -18,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from mjspace.scenario.construct import table_of
 from mjspace.scenario.declared import DeclaredIn, tables_in, type_of
+from mjspace.scenario.docstrings import docstrings
 from mjspace.scenario.fields import OneOrEach, Positive, Si
 from mjspace.scenario.scenario import Scenario
 from mjspace.scenario.sensors import KINDS, kinds
@@ -64,25 +62,7 @@ def _described(table: type[BaseModel], key: str) -> str:
     """Return the key's description, which a class may leave to the one that it is based on."""
     bases = [base for base in table.__mro__ if issubclass(base, BaseModel)]
     stated = table.model_fields[key].description
-    return stated or next((text for base in bases if (text := _docstrings(base).get(key))), "")
-
-
-@cache
-def _docstrings(table: type[BaseModel]) -> dict[str, str]:
-    """Return the string below each field of the class, by the field's name.
-
-    Pydantic reads them too, but at every start of mjspace, which takes 0.3 s.
-    """
-    tree = ast.parse(inspect.getsource(inspect.getmodule(table)))
-    classes = {node.name: node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
-    if table.__name__ not in classes:  # a generic one with its parameters
-        return {}
-    found = {}
-    for field, below in pairwise(classes[table.__name__].body):
-        match field, below:
-            case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(text))):
-                found[name] = inspect.cleandoc(text)
-    return found
+    return stated or next((text for base in bases if (text := docstrings(base).get(key))), "")
 
 
 def _laws() -> list[str]:
@@ -106,7 +86,10 @@ its range. Arrays may come from a CSV file: `file = "turn.csv"`, with a header t
 
 A law in a file of your own may import modules beside it, at the top of the file, and read data
 files beside it that it lists: `DATA_FILES = ("table.csv",)`, found from `Path(__file__).parent`.
-They all go into the log, from which the flight is replayed without the folder."""
+They all go into the log, from which the flight is replayed without the folder.
+
+A law in a shared library has the keys `state` and `signals`, one in another process `timeout`: see
+[flight software](flight_software.md)."""
     return [*lines, closing, ""]
 
 

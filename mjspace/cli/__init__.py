@@ -1,9 +1,9 @@
 """The command line: ``list``, ``info``, ``run``, ``replay``, ``render``, ``plot``, ``validate``.
 
-``recover`` saves what is whole of a damaged log. Exit status: 0 every check came out as the
-scenario expects, 1 flown but one did not (or a replay differed, or the flight ended early), 2 bad
-input. Modules are imported when a command needs them:
-``--help`` answers at once.
+``law-header``, ``serve-law`` and ``linearize`` are for flight software; ``recover`` saves what is
+whole of a damaged log. Exit status: 0 every check came out as the scenario expects, 1 flown but one
+did not (or a replay differed, or the flight ended early), 2 bad input. Modules are imported when a
+command needs them: ``--help`` answers at once.
 """
 
 import sys
@@ -11,7 +11,15 @@ import warnings
 
 import typer
 
-from mjspace.cli import flights, models, pictures, recovery, scenarios, validation
+from mjspace.cli import (
+    flight_software,
+    flights,
+    models,
+    pictures,
+    recovery,
+    scenarios,
+    validation,
+)
 from mjspace.errors import print_warning
 from mjspace.rendering import graphics
 from mjspace.terminal.reporting import report_errors
@@ -31,6 +39,9 @@ app.command()(flights.run)
 app.command()(flights.replay)
 app.command()(pictures.render)
 app.command()(pictures.plot)
+app.command()(flight_software.law_header)
+app.command()(flight_software.serve_law)
+app.command()(flight_software.linearize)
 app.command()(recovery.recover)
 app.command()(validation.validate)
 

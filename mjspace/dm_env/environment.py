@@ -23,7 +23,7 @@ from mjspace.dm_env.action import Action
 from mjspace.environment.install import install_callbacks
 from mjspace.errors import InputError
 from mjspace.scenario import loading
-from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.assembly import Assembly, without_law
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.initial_state import INTEGRATION, initial_physics, last_period, start_at
 from mjspace.simulation.loop import BLOCK_PERIODS
@@ -53,7 +53,7 @@ def load(scenario: str | Path, overrides: Iterable[str] = (), *, trust: bool = F
                 f"faults.{number}.when.signal: {fault.when.signal}: an environment flies no law: "
                 "give a signal of truth, measurement or command"
             )
-    assembly = assemble(loaded, folder, trust=trust, inner=False)
+    assembly = without_law(loaded, folder, trust=trust)
     return bridge.Environment(Physics(assembly), Tracking(assembly), n_sub_steps=loaded.rates.steps)
 
 

@@ -82,7 +82,7 @@ def channels(
         metadata |= {f"unit.{name}": known[name].si for name in fields if name in known}
         if every.get(topic, 1) != 1:
             metadata["every"] = str(every[topic])
-        declare(topic, PERIODIC[topic], "protobuf", _descriptor(PERIODIC[topic], fields), metadata)
+        declare(topic, PERIODIC[topic], "protobuf", descriptor(PERIODIC[topic], fields), metadata)
     for topic, message in _FOXGLOVE.items():
         described = message.DESCRIPTOR
         declare(topic, described.full_name, "protobuf", _descriptor_of(described.file), {})
@@ -90,8 +90,13 @@ def channels(
     return schemas, declared
 
 
-def _descriptor(message: str, fields: Fields) -> bytes:
+def descriptor(message: str, fields: Fields) -> bytes:
     """Return the serialized FileDescriptorSet of an mjspace message: ``double`` for shape ()."""
+    return FileDescriptorSet(file=[file_of(message, fields)]).SerializeToString()
+
+
+def file_of(message: str, fields: Fields) -> FileDescriptorProto:
+    """Return the descriptor of the file of an mjspace message, without its set."""
     package, _, name = message.partition(".")
     file = FileDescriptorProto(name=f"{package}/{name}.proto", package=package, syntax="proto3")
     proto = file.message_type.add(name=name)
@@ -104,7 +109,7 @@ def _descriptor(message: str, fields: Fields) -> bytes:
             if shape
             else FieldDescriptorProto.LABEL_OPTIONAL,
         )
-    return FileDescriptorSet(file=[file]).SerializeToString()
+    return file
 
 
 def _descriptor_of(file: FileDescriptor) -> bytes:

@@ -3,17 +3,18 @@
 import hashlib
 from pathlib import Path
 
-from mjspace.errors import InputError
+from mjspace.errors import InputError, shortened
 from mjspace.log.flown_scenario import model_of
 from mjspace.log.reader import Log
 from mjspace.scenario.scenario import Scenario
+from mjspace.scenario.trust import is_address
 
 
 def code_of(log: Log, scenario: Scenario, *, law: bool = True) -> dict[str, bytes]:
     """Return the files of the log that flying its ``scenario`` would run or read, by name.
 
     Those are the files of the reference and the disturbance, where they came from no module, and
-    with ``law`` those of the law.
+    with ``law`` those of the law, which may be a shared library.
 
     Raises:
         ValueError: an attachment is damaged.
@@ -21,7 +22,7 @@ def code_of(log: Log, scenario: Scenario, *, law: bool = True) -> dict[str, byte
     kinds = [scenario.reference.kind, scenario.environment.python or ""]
     kinds += [scenario.law.kind] if law else []
     places = [kind.partition(":")[0] for kind in kinds]
-    files = [place for place in places if place.endswith(".py")]
+    files = [place for place in places if place.endswith((".py", ".so"))]
     folders = tuple(place.partition("/")[0] + "/" for place in files if "/" in place)
     names = [name for name in log.attachments if name in files or name.startswith(folders)]
     return {name: log.attachment(name) for name in names}
@@ -51,6 +52,19 @@ def require_trust(files: dict[str, bytes]) -> None:
         raise InputError(
             f"log: to fly it again runs code out of the log, {named}: look at it with 'mjspace "
             "info', then give --trust if it is yours"
+        )
+
+
+def refuse_connection(scenario: Scenario) -> None:
+    """Refuse to connect to the law of a log's ``scenario``, where it is in another process.
+
+    Raises:
+        InputError: it is; with its address.
+    """
+    if is_address(scenario.law.kind):
+        raise InputError(
+            f"log: to fly it again needs the law that listened at {shortened(scenario.law.kind)}: "
+            "start it there, then give --trust, which connects to it"
         )
 
 

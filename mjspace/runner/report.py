@@ -134,12 +134,14 @@ def print_log(log: Log) -> None:
 def _print_code(console: Console, log: Log) -> None:
     """Print the name, the digest and the first lines of what ``replay --trust`` would run."""
     for name, content in _code(log).items():
+        is_text = name.endswith(".py")
         console.print(
-            f"{name}, sha256 {digest(content)}: runs only with --trust; it begins",
+            f"{name}, sha256 {digest(content)}: runs only with --trust"
+            + ("; it begins" if is_text else ""),
             highlight=False,
             markup=False,
         )
-        for line in content.decode(errors="replace").splitlines()[:LINES_SHOWN]:
+        for line in content.decode(errors="replace").splitlines()[: LINES_SHOWN * is_text]:
             console.print(f"    {printable(line)}", highlight=False, markup=False, soft_wrap=True)
 
 

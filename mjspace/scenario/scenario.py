@@ -32,7 +32,8 @@ class Component(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True)
 
     kind: KindName
-    """``"module:Class"`` in controllers/, or ``"file.py:Class"`` in the scenario's folder."""
+    """``"module:Class"`` in controllers/, or ``"file.py:Class"`` in the scenario's folder; of a law
+    also ``"library.so:function"`` there, or ``"tcp://host:port"``."""
 
     @property
     def gains(self) -> dict[str, Any]:

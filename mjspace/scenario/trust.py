@@ -6,15 +6,38 @@ import inspect
 import pkgutil
 from collections.abc import Sequence
 from dataclasses import dataclass
+from ipaddress import ip_address
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from mjspace.errors import nearest
+from mjspace.errors import nearest, shortened
 from mjspace.scenario.user_files import load_file
 
 GROUP = "mjspace.controllers"
 """The package of the laws that come with mjspace, and the entry points of those that do not."""
+
+
+def is_library(kind: str) -> bool:
+    """Return whether a law of that ``kind`` is a function of a shared library."""
+    return kind.partition(":")[0].endswith(".so")
+
+
+def is_address(kind: str) -> bool:
+    """Return whether a law of that ``kind`` is a process at the other end of a socket."""
+    return "://" in kind
+
+
+def function_of(kind: str) -> str:
+    """Return the function that ``"library.so:function"`` names.
+
+    Raises:
+        ValueError: none that C could have.
+    """
+    name = str(kind.partition(":")[2])
+    if not (name.isascii() and name.isidentifier()):
+        raise ValueError(f"{shortened(kind)!r}: write 'library.so:function'")
+    return name
 
 
 class CommandLineText(str):
@@ -45,6 +68,39 @@ class Trust:
         if not (self._trusts(name) or path.resolve().is_relative_to(self.folder.resolve())):
             raise ValueError(f"{name} is outside the scenario's folder: --trust allows that")
         return path
+
+    def library(self, kind: str) -> tuple[Path, str]:
+        """Return the file and the function that ``"library.so:function"`` names.
+
+        Raises:
+            ValueError: it names no function, or a file that may not run or is not there.
+        """
+        name = function_of(kind)
+        path = self.file(type(kind)(kind.partition(":")[0]))
+        if not path.is_file():
+            raise ValueError(f"no file {path}")
+        return path, name
+
+    def address(self, kind: str) -> tuple[str, int]:
+        """Return the host and the port of ``"tcp://host:port"``.
+
+        Raises:
+            ValueError: it is no such address; or another machine's, and the scenario is not
+                trusted.
+        """
+        scheme, _, place = kind.partition("://")
+        host, _, port = place.rpartition(":")
+        host = host.removeprefix("[").removesuffix("]")
+        if scheme != "tcp" or not host:
+            raise ValueError(f"{shortened(kind)!r}: write 'tcp://host:port'")
+        if not (port.isascii() and port.isdigit() and len(port) < 6 and 0 < int(port) < 65536):
+            raise ValueError(f"{shortened(kind)!r}: the port should be from 1 to 65535")
+        if not (self._trusts(kind) or _is_this_machine(host)):
+            raise ValueError(
+                f"{shortened(kind)!r} is another machine, to which the flight's data would go: "
+                "--trust allows that"
+            )
+        return host, int(port)
 
     def load(self, kind: str) -> Any:
         """Return the class or function that ``"module:Name"`` or ``"file.py:Name"`` names.
@@ -113,6 +169,17 @@ def controllers() -> dict[str, str]:
     package = importlib.import_module(GROUP)
     found = pkgutil.walk_packages(package.__path__, f"{GROUP}.")
     return {each.name.rpartition(".")[2]: each.name for each in found if not each.ispkg}
+
+
+def _is_this_machine(host: str) -> bool:
+    """Return whether what is sent to the ``host`` does not leave this machine.
+
+    A name is not looked up: that would be sent already.
+    """
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _entry_points() -> dict[str, str]:

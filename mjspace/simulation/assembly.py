@@ -1,7 +1,7 @@
 """From a scenario to everything that flies: vehicle, environment, sensors, actuators, law."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from mjspace.environment.orbit import orbit_position
 from mjspace.errors import input_error_at
 from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component, Scenario
-from mjspace.scenario.trust import Trust
+from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import Surroundings
 from mjspace.sensors.suite import SensorSuite
@@ -126,20 +126,29 @@ def assemble(
     *,
     trust: bool = False,
     law_folder: Path | None = None,
-    inner: bool = True,
 ) -> Assembly:
     """Return the scenario's assembly; ``folder`` holds the files that it names.
 
     With ``trust`` it may name files elsewhere and any installed module: see ``Trust``. A law from
-    ``law_folder``, where there is one, is trusted. Without ``inner`` the actuators are commanded
-    once in a control period, also where the law has an inner loop.
+    ``law_folder``, where there is one, is trusted.
 
     Raises:
         InputError: a part cannot be built, with the scenario's key and what would be right.
     """
     own = Trust(folder, everything=trust)
-    sources: dict[str, bytes] = {}
+    of_law = own if law_folder is None else Trust(law_folder, everything=True)
+    if is_library(scenario.law.kind):
+        from mjspace.simulation.flight_software import shared_library  # which needs an Assembly
+
+        still = without_law(scenario, folder, trust=trust)
+        return shared_library.fly_under(still, scenario.law, of_law)
+    if is_address(scenario.law.kind):
+        from mjspace.simulation.flight_software import socket_law
+
+        still = without_law(scenario, folder, trust=trust)
+        return socket_law.fly_under(still, scenario.law, of_law)
     flown: dict[str, Any] = {}
+    sources: dict[str, bytes] = {}
     model = None
     if scenario.plant.is_own:
         model = _part("plant.model", own_model.open_source, scenario.plant.model, own)
@@ -149,21 +158,11 @@ def assemble(
     vehicle = _part(
         "plant", partial(build, userdata=size, source=model), scenario.plant, scenario.rates
     )
-    facts = {
-        "inertia": vehicle.inertia,
-        "wheel_axes": vehicle.wheel_axes,
-        "wheel_inertia": vehicle.wheel_inertia,
-        "control_period": scenario.rates.control,
-        "inner_period": scenario.rates.physics,
-    }
-    for table in scenario.plant.equipment.values():
-        facts |= table.facts(vehicle)
-    facts |= model_motors.facts_of(vehicle)
-    of_law = own if law_folder is None else Trust(law_folder, everything=True)
+    facts = facts_of(vehicle, scenario)
     law, flown["law"] = _component("law", scenario.law, facts, of_law, sources)
     reference, flown["reference"] = _component("reference", scenario.reference, facts, own, sources)
     _part("reference", reference.at, np.array([0.0, scenario.duration]))
-    inner = inner and _part("law", _has_inner_loop, law)
+    inner = _part("law", _has_inner_loop, law)
     disturbance = None
     kind = scenario.environment.python
     if kind is not None:
@@ -198,6 +197,32 @@ def assemble(
     _part("sensors", assembly.sensors, [0])
     _part("faults", assembly.faults, [0])
     return assembly
+
+
+def without_law(scenario: Scenario, folder: Path, *, trust: bool = False) -> Assembly:
+    """Return the scenario's assembly under a law that commands nothing, with no source of it.
+
+    Raises:
+        InputError: as ``assemble``.
+    """
+    still = scenario.model_copy(update={"law": Component(kind="coast:Coast")})
+    assembly = assemble(still, folder, trust=trust)
+    sources = {name: text for name, text in assembly.sources.items() if name != "law.py"}
+    return replace(assembly, sources=sources)
+
+
+def facts_of(vehicle: Vehicle, scenario: Scenario) -> dict[str, Any]:
+    """Return the vehicle's properties, and the periods [s], that a law may take from them."""
+    facts = {
+        "inertia": vehicle.inertia,
+        "wheel_axes": vehicle.wheel_axes,
+        "wheel_inertia": vehicle.wheel_inertia,
+        "control_period": scenario.rates.control,
+        "inner_period": scenario.rates.physics,
+    }
+    for table in scenario.plant.equipment.values():
+        facts |= table.facts(vehicle)
+    return facts | model_motors.facts_of(vehicle)
 
 
 def _component(

@@ -51,9 +51,7 @@ class FlownLaw:
                 same shapes as before.
         """
         if self.state is None:
-            state = _called(self._law.reset, measurement, reference)
-            check_state(state)
-            self.state = _kept(state)
+            self.reset(measurement, reference)
         before, called, self.called = self.state, self.called, None
         if called is not None and called[0] == time:
             _, self.state, *others = called
@@ -63,6 +61,16 @@ class FlownLaw:
         state, command, signals = returned
         self.state = _kept(state)
         return before, read_only(command), read_only(signals or ())
+
+    def reset(self, measurement: Measurement, reference: DesiredMotion) -> None:
+        """Put the law into the state in which a flight starts.
+
+        Raises:
+            FlightError: it raised, or returned what cannot be a state.
+        """
+        state = _called(self._law.reset, measurement, reference)
+        check_state(state)
+        self.state = _kept(state)
 
     @property
     def one_by_one(self) -> bool:

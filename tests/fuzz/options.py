@@ -49,6 +49,7 @@ SETS = [
 ]
 SETS += ["rates.control=inf", "sensors.attitude.delay=1000000", "plant.model=lander", "law={}"]
 SETS += ["checks=[]", "environment.python=x.py:f", "law.gain=" + "[" * 500, "name=../x", "plant=1"]
+SETS += ["law.kind=x.so:f", "law.kind=tcp://127.0.0.1:1", "law.kind=udp://x:99999", "law.x={}"]
 SETS += ["log.state=0", "log.default='1 ns'", "reference.kind=tabulated:Table", "reference.file=/"]
 SCENARIOS = [
     "contraction-ideal",
@@ -83,7 +84,7 @@ def words(draw: random.Random) -> list[str]:
 
     log = draw.choice(("flight.mcap",) * 6 + ("x.toml", "none.mcap", "", "."))
     match draw.choice(
-        ("run", "run", "info", "plot", "render", "render", "replay", "replay", "odd")
+        ("run", "run", "info", "plot", "render", "render", "replay", "replay", "software", "odd")
     ):
         case "run":
             given = [
@@ -108,6 +109,9 @@ def words(draw: random.Random) -> list[str]:
             given = ["replay", log, *draw.choice(([], ["--verify"], ["--trust"], ["--json"]))]
             given += some("--from", NUMBERS) + some("--out", TEXTS) + some("--gain", SETS)
             given += some("--law", ["coast:Coast", "os:system", "x.py:Y", "contraction:np", *TEXTS])
+        case "software":
+            given = [draw.choice(("linearize", "law-header")), draw.choice(SCENARIOS)]
+            given += [*some("--set", SETS), *some("--set", SETS), "-o", any_of(FILES, TEXTS)]
         case _:
             odd = ("list", "validate", "--help", "--x", "replay", "recover", "\udcff", "")
             given = [draw.choice(odd), *some("--only", TEXTS), *some("--x", TEXTS)]

@@ -1,0 +1,1 @@
+"""Flight software in other languages: what passes to it and back, and how it is called."""

@@ -1,0 +1,252 @@
+"""Matrices of linearized vehicles against closed forms, and against the flight itself."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+import mjspace
+from mjspace import cli
+from mjspace.errors import InputError
+from mjspace.simulation.linear_plant import LinearPlant
+
+RIGID = """
+description = "a rigid body with ideal thrusters"
+duration = "1 s"
+[plant]
+model = "satellite_3rw"
+mass = 100
+bus_inertia = [[10.5, 0.22, 0.47], [0.22, 12.5, 0.36], [0.47, 0.36, 13.6]]
+ideal_thrusters = true
+[plant.wheels]
+axes = []
+[reference]
+kind = "references:Hold"
+[law]
+kind = "nothing.so:yet"
+"""
+J = np.array([[10.5, 0.22, 0.47], [0.22, 12.5, 0.36], [0.47, 0.36, 13.6]])
+ORBIT = ["environment.orbit.semi_major_axis=7e6"]
+N2 = 3.986004418e14 / 7e6**3  # rad^2/s^2
+
+
+def vectors(largest: float) -> st.SearchStrategy[np.ndarray]:
+    """Return vectors of three numbers that a scenario can hold."""
+    numbers = st.floats(-largest, largest).map(lambda number: round(number, 6))
+    return st.lists(numbers, min_size=3, max_size=3).map(np.array)
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("rigid") / "rigid.toml"
+    path.write_text(RIGID)
+    return path
+
+
+def cross(v: np.ndarray) -> np.ndarray:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def block(plant: LinearPlant, matrix: str, row: str, column: str) -> Any:
+    """Return the part of a matrix between two named quantities."""
+    of_rows, of_columns = {
+        "A": (plant.states, plant.states),
+        "Ad": (plant.states, plant.states),
+        "B": (plant.states, plant.inputs),
+        "C": (plant.outputs, plant.states),
+    }[matrix]
+    chosen = [
+        [i for i, each in enumerate(names) if each.partition("[")[0] == name]
+        for names, name in ((of_rows, row), (of_columns, column))
+    ]
+    return getattr(plant, matrix)[np.ix_(*chosen)]
+
+
+def test_a_rigid_body_at_rest_is_a_double_integrator(rigid: Path) -> None:
+    plant = mjspace.linearize(rigid)
+    expected = np.zeros((12, 12))
+    expected[:6, 6:] = np.eye(6)
+    np.testing.assert_allclose(plant.A, expected, atol=1e-10)
+    np.testing.assert_allclose(block(plant, "B", "rate", "torque"), np.linalg.inv(J), atol=1e-12)
+    assert not block(plant, "B", "velocity", "torque").any()
+    assert not plant.D.any()
+    T = plant.control_period
+    assert T == 1e-3
+    np.testing.assert_allclose(plant.Bd[9:], T * np.linalg.inv(J), rtol=1e-8, atol=1e-16)
+    np.testing.assert_allclose(plant.Bd[3:6], T**2 / 2 * np.linalg.inv(J), rtol=1e-5, atol=1e-12)
+
+
+@settings(max_examples=8, deadline=None)
+@given(vectors(0.5))
+def test_a_spinning_body_has_eulers_equations(rigid: Path, rate: np.ndarray) -> None:
+    """J w' = -w x J w, linearized; and attitude' = rate - w x attitude."""
+    plant = mjspace.linearize(rigid, [f"initial.rate={rate.tolist()}"])
+    of_rates = np.linalg.solve(J, cross(J @ rate) - cross(rate) @ J)
+    np.testing.assert_allclose(block(plant, "A", "rate", "rate"), of_rates, atol=1e-9)
+    np.testing.assert_allclose(block(plant, "A", "attitude", "attitude"), -cross(rate), atol=0)
+    assert np.abs(block(plant, "A", "rate", "attitude")).max() < 1e-9
+
+
+@settings(max_examples=8, deadline=None)
+@given(vectors(0.5), vectors(200.0))
+def test_wheels_couple_the_axes_by_their_momentum(rate: np.ndarray, speed: np.ndarray) -> None:
+    """H w' = -w x (J w + Jw a W) for motors at rest, J = H + a^T Jw a; and torque is a reaction."""
+    overrides = [f"initial.rate={rate.tolist()}", f"initial.wheel_speed={speed.tolist()}"]
+    plant = mjspace.linearize("detumble-wheels", overrides)
+    wheels, inertia, axial = np.eye(3), np.diag([10.0, 12.0, 14.0]), 0.05
+    total = inertia + axial * wheels.T @ wheels
+    momentum = total @ rate + axial * wheels.T @ speed
+    of_rates = np.linalg.solve(inertia, cross(momentum) - cross(rate) @ total)
+    of_wheels = np.linalg.solve(inertia, -cross(rate) @ (axial * wheels.T))
+    np.testing.assert_allclose(block(plant, "A", "rate", "rate"), of_rates, atol=1e-8)
+    np.testing.assert_allclose(block(plant, "A", "rate", "wheel_speed"), of_wheels, atol=1e-9)
+    reaction = np.linalg.inv(inertia)
+    np.testing.assert_allclose(block(plant, "B", "rate", "torque"), reaction, atol=1e-10)
+    speeds = -np.eye(3) / axial - reaction
+    np.testing.assert_allclose(block(plant, "B", "wheel_speed", "torque"), speeds, atol=1e-8)
+
+
+def test_gravity_gives_its_stiffness(rigid: Path) -> None:
+    """J w' = 3 n^2 o x J o (Wertz 17.2.1); the local vertical o turns by o x attitude."""
+    plant = mjspace.linearize(rigid, ORBIT)
+    o = np.array([1.0, 0.0, 0.0])  # at the ascending node, in which it starts
+    torque = 3.0 * N2 * (cross(o) @ J @ cross(o) - cross(J @ o) @ cross(o))
+    expected = np.linalg.solve(J, torque)
+    np.testing.assert_allclose(
+        block(plant, "A", "rate", "attitude"), expected, atol=1e-6 * np.abs(expected).max()
+    )
+    tides = N2 * np.diag([2.0, -1.0, -1.0])
+    np.testing.assert_allclose(
+        block(plant, "A", "velocity", "position"), tides, rtol=1e-4, atol=1e-11
+    )
+
+
+SPIN = "initial.rate=[0, 0, 0.3]"
+
+
+@pytest.mark.parametrize(
+    ("scenario", "equilibrium"),
+    [
+        ("lqr-gravity-gradient", []),
+        ("detumble-wheels", [SPIN, "initial.wheel_speed=[0, 0, 50]"]),
+        ("nutation-damper", [SPIN, "initial.wheel_speed=[0, 0, 0]"]),
+    ],
+)
+def test_the_discrete_matrices_are_those_of_a_held_command(
+    scenario: str, equilibrium: list[str]
+) -> None:
+    plant = mjspace.linearize(scenario, equilibrium)
+    n, m = plant.B.shape
+    both = np.zeros((n + m, n + m))
+    both[:n] = np.hstack([plant.A, plant.B])
+    held = expm(both * plant.control_period)
+    scale = np.abs(plant.Bd).max()
+    np.testing.assert_allclose(held[:n, :n], plant.Ad, atol=1e-7)
+    np.testing.assert_allclose(held[:n, n:], plant.Bd, atol=1e-7 * scale)
+
+
+def test_they_tell_how_a_flight_goes_on(rigid: Path, tmp_path: Path) -> None:
+    """Ten control periods from a small error, under no command."""
+    moved = ["initial.rate=[1e-4, -2e-4, 3e-4]", "initial.euler=[1e-4, 0, -1e-4]"]
+    calm = ["initial.rate=[0.2, 0, 0]"]
+    spinning = ["initial.rate=[0.2001, -2e-4, 3e-4]", "initial.euler=[1e-4, 0, -1e-4]"]
+    for nominal, other in (([], moved), (calm, spinning)):
+        plant = mjspace.linearize(rigid, nominal)
+        coast = ["law.kind=coast:Coast", "rates.control='100 ms'", "duration=0.1"]
+        rows = [
+            mjspace.run(
+                rigid, overrides=[*coast, *each], out=tmp_path / "out", force=True
+            ).log.read("/truth")["rate"]
+            for each in (nominal, other)
+        ]
+        start, end = rows[1] - rows[0]
+        predicted = expm(0.1 * block(plant, "A", "rate", "rate")) @ start
+        np.testing.assert_allclose(end, predicted, atol=1e-7)
+
+
+def test_outputs_are_what_sensors_measure_under_their_names(rigid: Path) -> None:
+    overrides = [
+        "sensors.tracker.measures=attitude",
+        "sensors.tracker.noise_std='10 arcsec'",
+        "sensors.attitude.noise_std=1e-3",
+        "sensors.gps.measures=position",
+        "sensors.specific_force={}",
+        "initial.rate=[0.1, 0.2, 0.3]",
+        "initial.attitude=[0.5, 0.5, -0.5, 0.5]",
+    ]
+    plant = mjspace.linearize(rigid, overrides)
+    named = [f"{name}[{i}]" for name in ("tracker", "attitude", "gps", "rate") for i in range(3)]
+    assert sorted(plant.outputs) == sorted(named)
+    for sensor, state in (("tracker", "attitude"), ("gps", "position"), ("rate", "rate")):
+        np.testing.assert_allclose(block(plant, "C", sensor, state), np.eye(3), atol=1e-9)
+    assert np.count_nonzero(np.abs(plant.C) > 1e-9) == 12
+    noise = dict(zip(plant.outputs, plant.noise_std, strict=True))
+    assert noise["tracker[2]"] == pytest.approx(np.radians(10 / 3600))
+    assert noise["attitude[0]"] == 1e-3
+    assert noise["gps[1]"] == 0.0
+    units = dict(zip(plant.outputs, plant.output_units, strict=True))
+    assert [units[f"{name}[0]"] for name in ("tracker", "gps", "rate")] == ["rad", "m", "rad/s"]
+
+
+def test_coils_act_by_the_field_that_a_magnetometer_measures() -> None:
+    """Torque = dipole x field; and the field, which is inertial, turns by field x attitude."""
+    plant = mjspace.linearize("b-dot")
+    field = block(plant, "C", "magnetic_field", "attitude")
+    assert 1e-5 < np.linalg.norm(field) < 1e-4  # of the Earth [T], sqrt(2) times
+    torque = 10.0 * block(plant, "B", "rate", "dipole")  # a sphere of 10 kg m^2
+    np.testing.assert_allclose(torque, -field, atol=1e-11)
+
+
+def test_hinges_and_wheels_have_their_names() -> None:
+    plant = mjspace.linearize("nutation-damper")
+    bus = ["position", "attitude", "velocity", "rate"]
+    names = [f"{name}[{i}]" for name in bus for i in range(3)]
+    names += [f"wheel_speed[{i}]" for i in range(3)]
+    others = sorted(set(plant.states) - set(names))
+    assert [name.rpartition(".")[2] for name in others] == ["position", "velocity"]
+    assert len(plant.states) == len(names) + 2 == len(plant.A) == len(plant.state_units)
+    units = dict(zip(plant.states, plant.state_units, strict=True))
+    assert [units[name] for name in others] == ["rad", "rad/s"]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "said"),
+    [
+        ("rcs-schmitt", "plant: Thrusters has states of its own .*rcs_thrust"),
+        ("dgvscmg-tracking", "plant: MotorDrives has states of its own .*current"),
+        ("cmg-slew", "plant: GimbalServos has states of its own .*servo_integral"),
+        ("no-such", "no scenario"),
+    ],
+)
+def test_what_has_no_linear_model_is_refused(
+    scenario: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(InputError, match=said):
+        mjspace.linearize(scenario)
+    assert command_line("linearize", scenario, "--out", str(tmp_path / "plant.npz")) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def command_line(*words: str) -> int:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["mjspace", *words])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+    return int(ended.value.code or 0)
+
+
+def test_the_file_holds_it_all(rigid: Path, tmp_path: Path) -> None:
+    path = tmp_path / "plant.npz"
+    assert command_line("linearize", str(rigid), "--out", str(path)) == 0
+    plant, read = mjspace.linearize(rigid), np.load(path)  # without pickles
+    assert set(read.files) == set(vars(plant))
+    for name in read.files:
+        np.testing.assert_array_equal(read[name], getattr(plant, name))
+    with pytest.raises(OSError, match="No such file"):
+        plant.save(tmp_path / "none" / "plant.npz")
