@@ -13,6 +13,13 @@ from mjspace.vehicle.step_effect import State, StepEffect
 
 _OF_FORCES = int(mujoco.mjtStage.mjSTAGE_ACC)
 PREFIX = "model_sensor_"
+_UNITS = {
+    **dict.fromkeys(("gyro", "frameangvel", "ballangvel"), "rad/s"),
+    **dict.fromkeys(("velocimeter", "framelinvel", "subtreelinvel", "tendonvel"), "m/s"),
+    **dict.fromkeys(("framepos", "subtreecom", "rangefinder", "tendonpos"), "m"),
+    "subtreeangmom": "N m s",
+    "clock": "s",
+}
 
 
 class ModelSensor(NamedTuple):
@@ -26,6 +33,8 @@ class ModelSensor(NamedTuple):
     """MuJoCo's: "gyro", "framequat", ...."""
     size: int
     """How many numbers it reports."""
+    unit: str
+    """Of what it reports; "" for numbers, and where MuJoCo leaves it open."""
     measured: bool
     """Whether a law receives it: not, where it depends on forces, as an accelerometer does."""
 
@@ -40,9 +49,16 @@ def sensors_of(model: Any) -> tuple[ModelSensor, ...]:
         plain = f"model_{plain}" if plain in taken or plain.startswith("_") else plain
         taken.add(plain)
         kind = mujoco.mjtSensor(model.sensor_type[i]).name.removeprefix("mjSENS_").lower()
-        measured = model.sensor_needstage[i] < _OF_FORCES
-        found.append(ModelSensor(name, plain, kind, int(model.sensor_dim[i]), bool(measured)))
+        size, measured = int(model.sensor_dim[i]), bool(model.sensor_needstage[i] < _OF_FORCES)
+        found.append(ModelSensor(name, plain, kind, size, _unit(model, i, kind), measured))
     return tuple(found)
+
+
+def _unit(model: Any, sensor: int, kind: str) -> str:
+    if kind not in ("jointpos", "jointvel"):
+        return _UNITS.get(kind, "")
+    hinge = model.jnt_type[model.sensor_objid[sensor]] == mujoco.mjtJoint.mjJNT_HINGE
+    return ("rad" if hinge else "m") + ("/s" if kind == "jointvel" else "")
 
 
 @dataclass(eq=False)

@@ -66,6 +66,8 @@ def test_its_sensors_are_measured_under_their_names(tmp_path: Path) -> None:
     result = run(write(tmp_path), out=tmp_path / "out")
     seen = result.log.read("/measurement")
     assert {"imu_rate", "star_tracker", "elbow_angle", "model_rate"} <= seen.keys()
+    units = result.log.units["/measurement"]
+    assert (units["imu_rate"], units["elbow_angle"]) == ("rad/s", "rad")
     assert "acceleration" not in seen  # it depends on forces, which act after the law
     turn = attitude.from_rotation_vector(np.array([0.0, 0.0, np.radians(30.0)]))
     back = attitude.conjugate(turn)
