@@ -248,6 +248,18 @@ def test_a_full_disk_is_named_and_leaves_no_picture(
     assert not path.exists()
 
 
+@needs_opengl
+@pytest.mark.parametrize("name", ["x.png", "x.mp4"])
+def test_a_link_is_not_followed(pictured_log: Path, tmp_path: Path, name: str) -> None:
+    target, link = tmp_path / "precious", tmp_path / name
+    target.write_text("mine")
+    link.symlink_to(target)
+    render(pictured_log, link, size=(64, 48), rate=2.0)
+    assert not link.is_symlink()
+    assert link.stat().st_size > 100
+    assert target.read_text() == "mine"
+
+
 @pytest.mark.parametrize(
     ("output", "wrong", "said"),
     [
