@@ -6,24 +6,16 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from compiled_flights import assembly, assert_same, flown, one_of
+from blocks import blocks_of
+from compiled_flights import SHORT_BLOCKS, assembly, assert_same, flown, one_of
 
 from mjspace.environment.install import install_callbacks
 from mjspace.simulation import loop, mujoco_warnings
 from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.initial_state import INTEGRATION, Start, first_start
 from mjspace.simulation.stepper import Stepper
-from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
-pytestmark = pytest.mark.filterwarnings(
-    f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
-)
-
-
-@pytest.fixture(autouse=True)
-def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", 40)
-    monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
+pytestmark = SHORT_BLOCKS
 
 
 ALL = "compiled: sensors, law, actuators and step effects ({})"
@@ -201,9 +193,8 @@ class Law(VariableStructure):
 @pytest.mark.parametrize("periods", [2, 3, 40])  # of a block, so that it is in any of them
 @pytest.mark.parametrize("sensors", [[], ["sensors.position.period='60 ms'"]])
 def test_a_law_that_is_called_in_python_is_called_once_where_something_happens(
-    sensors: list[str], periods: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+    sensors: list[str], periods: int, tmp_path: Any
 ) -> None:
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", periods)
     flights = []
     for compiled in (True, False):
         folder = tmp_path / str(compiled)
@@ -211,7 +202,8 @@ def test_a_law_that_is_called_in_python_is_called_once_where_something_happens(
         (folder / "own.py").write_text(COUNTS)
         own = "law.kind='own.py:Law'"
         built = assembly("lander", *CRASHES, *sensors, own, folder=folder)
-        flights.append(flown(built, compiled=compiled))
+        with blocks_of(periods):
+            flights.append(flown(built, compiled=compiled))
     assert "law called in Python" in flights[0].compiled
     assert len(flights[1].events) >= 2
     assert_same(*flights)
