@@ -3,7 +3,7 @@
 import gzip
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,9 @@ from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering import overlay
 from mjspace.rendering.offscreen import Canvas
-from mjspace.rendering.render import captions, nearest_rows, render, shares_of_thrust
+from mjspace.rendering.render import _frames, captions, nearest_rows, render, shares_of_thrust
 from mjspace.rendering.scene import Stage
-from mjspace.rendering.video import Video
+from mjspace.rendering.video import Frame, Video
 from mjspace.vehicle.vehicle import from_mjb
 
 SIZE = 320, 180
@@ -281,6 +281,20 @@ def test_bad_input_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=said):
         render(pictured_log, tmp_path / output, **wrong)
+    assert not list(tmp_path.iterdir())
+
+
+@needs_opengl
+def test_a_log_that_is_damaged_further_on_leaves_no_still(
+    pictured_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def damaged(*arguments: Any) -> Iterator[Frame]:
+        yield from _frames(*arguments)
+        raise ValueError("time does not go on")
+
+    monkeypatch.setattr("mjspace.rendering.render._frames", damaged)
+    with pytest.raises(ValueError, match="time does not go on"):
+        render(pictured_log, tmp_path / "x.png", size=(64, 48))
     assert not list(tmp_path.iterdir())
 
 
