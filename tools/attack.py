@@ -5,6 +5,7 @@
 Each finding is printed with the name of its case. Exit status: 1 if there is one, else 0.
 """
 
+import signal
 import sys
 import tempfile
 import time
@@ -76,6 +77,8 @@ def kills(cases: Cases = 1000, seed: Seed = 0, jobs: Jobs = 2) -> None:
     """Send flights a signal at a random instant, and look at what their logs have lost."""
     import kills
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # a shell's & and nohup let them be ignored
     _warm_up()
     found = []
     bad = 0

@@ -1,6 +1,7 @@
 """Scenarios and options with mistakes are obeyed, or refused in one line."""
 
 import os
+import sys
 import time
 from itertools import islice
 from pathlib import Path
@@ -35,6 +36,28 @@ def test_no_mistake_in_an_option_is_a_traceback(seed: int, tmp_path: Path) -> No
             folder = tmp_path / name
             folder.mkdir()
             assert not list(options.attack(given, log, folder, commands)), name
+
+
+def test_a_process_that_has_died_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def main() -> None:
+        print(os.getpid())
+        if sys.argv[1] == "die":
+            sys.stdout.flush()
+            os.kill(os.getpid(), 9)
+
+    monkeypatch.setattr(cli, "main", main)
+    monkeypatch.setattr(outcomes, "IN_A_ROW", 2)
+    found = []
+    with Commands() as commands:
+        for what in ("die", "live", "live", "live"):
+            status = commands.outcome((what,), tmp_path).status
+            found.append((status, (tmp_path / ".out").read_text()))
+    statuses, processes = zip(*found, strict=True)
+    assert statuses == (-9, 0, 0, 0)
+    assert processes[1] == processes[2]
+    assert len({*processes, f"{os.getpid()}\n"}) == 4
 
 
 def test_faults_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
