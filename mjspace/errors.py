@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from mjspace.interrupts import Interrupted
 
@@ -46,13 +46,15 @@ def input_error_at(key: str) -> Iterator[None]:
 
 
 @contextmanager
-def whole_or_none(path: Path) -> Iterator[None]:
-    """Remove the file that the block began and could not write to its end; name it in an OSError.
+def whole_or_none(path: Path) -> Iterator[BinaryIO]:
+    """Yield a new file, in place of what is there; of a link, the link alone is replaced.
 
-    What could not even be opened is left as it is.
+    A file that the block could not write to its end is removed; an OSError names it.
     """
+    path.unlink(missing_ok=True)
     try:
-        yield
+        with path.open("xb") as file:
+            yield file
     except OSError as error:
         if error.filename is None:
             path.unlink(missing_ok=True)

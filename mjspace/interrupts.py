@@ -7,7 +7,9 @@ import time
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from threading import Thread, current_thread, main_thread
+from types import FrameType
 from typing import Any, NoReturn, TypeVar
 
 GRACE = 1.0
@@ -20,6 +22,7 @@ SIGNALS = tuple(
 received = array("q", [0])
 """The signal that a flight is to stop for, else 0: compiled code reads it at its address."""
 
+_TESTBED = str(Path(__file__).parent) + os.sep
 _Block = TypeVar("_Block")
 
 
@@ -51,10 +54,13 @@ class Stop:
             Interrupted: so it was.
         """
         self._breakable, self._at_once = True, at_once
+        tracing = sys.gettrace()
         try:
             yield
         finally:
             self._breakable = self._at_once = False
+            if sys.gettrace() is not tracing:
+                sys.settrace(tracing)
 
     def breaking_off(self, blocks: Iterator[_Block]) -> Iterator[_Block]:
         """Yield the ``blocks``; the making of each is breakable."""
@@ -73,10 +79,28 @@ class Stop:
         if self._at_once:
             self.break_off()
 
-    def break_off(self, *_: Any) -> None:
+    def break_off(self, _number: int = 0, frame: FrameType | None = None) -> None:
         """Raise ``Interrupted`` in what is breakable: a handler of signals."""
         if self._breakable:
+            self._raise_again_in(frame)
             raise Interrupted(self.signal)
+
+    def _raise_again_in(self, frame: FrameType | None) -> None:
+        """Let the next line of the user's code that is run raise it too.
+
+        Such a line is run only if ``except:`` has caught it, and stands in that clause, from where
+        it leaves the loop around. Python ends the tracing when a trace function raises.
+        """
+
+        def again(_frame: FrameType, event: str, _argument: object) -> Any:
+            if event == "line":
+                raise Interrupted(self.signal)
+            return again
+
+        while frame is not None and not frame.f_code.co_filename.startswith(_TESTBED):
+            frame.f_trace = again
+            frame = frame.f_back
+        sys.settrace(lambda *_: None)  # without one, frames' own are not called
 
 
 @contextmanager

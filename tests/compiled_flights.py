@@ -15,6 +15,15 @@ from mjspace.simulation import compiled_blocks
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start
 from mjspace.simulation.loop import fly
+from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
+
+SHORT_BLOCKS = [
+    pytest.mark.usefixtures("short_blocks"),
+    pytest.mark.filterwarnings(
+        f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
+    ),
+]
+"""Marks of a test module whose flights are of several blocks, some of them of papers' bodies."""
 
 
 class Flown(NamedTuple):

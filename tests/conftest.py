@@ -1,14 +1,15 @@
 """Its presence puts this folder on the path: ``from oracle import fly`` works in every test."""
 
-import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from blocks import blocks_of
 from hypothesis import settings
 
 from mjspace.runner.run import run
+from mjspace.simulation import loop
 
 # The same examples on every run where a failure could not be told from a change.
 settings.register_profile("ci", derandomize=True)
@@ -17,9 +18,17 @@ if os.environ.get("CI"):
 
 
 @pytest.fixture
-def one_block(monkeypatch: pytest.MonkeyPatch) -> None:
+def one_block() -> Iterator[None]:
     """Let a short flight be one block on a slow machine too."""
-    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_SECONDS", math.inf)
+    with blocks_of(loop.BLOCK_PERIODS):
+        yield
+
+
+@pytest.fixture
+def short_blocks() -> Iterator[None]:
+    """Let a short flight be several blocks, of 40 periods each."""
+    with blocks_of(40):
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -37,7 +46,9 @@ def pictured_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run("contraction-adaptive", overrides=overrides, out=folder).path
 
 
-_FAILING_LAW = """
+_LAW = """
+import time
+from pathlib import Path
 from typing import NamedTuple
 import numpy as np
 
@@ -48,22 +59,27 @@ class Law:
     def reset(self, measurement, reference):
         return None
 
-    def step(self, state, time, measurement, reference):
-        if time > {time}:
-            raise ArithmeticError("no way on")
+    def step(self, state, now, measurement, reference):
+        if now > {at}:
+            {what}
         return None, Command(np.zeros(3)), ()
 """
 
 
 @pytest.fixture
 def failing_law(tmp_path: Path) -> Callable[..., Path]:
-    """Write a scenario in which a law in ``law.py`` commands no torque and raises after a time [s].
+    """Write a scenario in which a law in ``law.py`` commands no torque and fails after a time [s].
 
-    Returned is its path; ``before`` is what stands in it before the table of the law.
+    Returned is its path; ``before`` is what stands in it before the table of the law, ``what`` the
+    statement that fails.
     """
 
-    def write(time: float, before: str = 'base = "detumble-wheels"\nchecks = []\n') -> Path:
-        (tmp_path / "law.py").write_text(_FAILING_LAW.format(time=time))
+    def write(
+        at: float,
+        before: str = 'base = "detumble-wheels"\nchecks = []\n',
+        what: str = 'raise ArithmeticError("no way on")',
+    ) -> Path:
+        (tmp_path / "law.py").write_text(_LAW.format(at=at, what=what))
         path = tmp_path / "x.toml"
         path.write_text(f'{before}[law]\nkind = "law.py:Law"\n')
         return path

@@ -5,14 +5,17 @@
 Each finding is printed with the name of its case. Exit status: 1 if there is one, else 0.
 """
 
+import signal
 import sys
 import tempfile
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import islice
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -21,10 +24,15 @@ from rich.progress import track
 
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests/fuzz")]
+
+from outcomes import Commands  # noqa: E402 - which lies there
+
 KEEP = ROOT / "build/attack"
 """Where cases with a finding are kept."""
 BATCH = 10
 """Cases from one progress report to the next."""
+SHORT = {"contraction-ideal": ["duration=0.05", "checks=[]"]}
+"""A flight that makes a good log, by scenario with overrides."""
 
 Findings = list[tuple[str, str]]
 """Name of the case and what was wrong, one for each fault."""
@@ -51,8 +59,7 @@ def scenarios(cases: Cases = 10000, seed: Seed = 0, jobs: Jobs = 2) -> None:
 def options(cases: Cases = 2000, seed: Seed = 0, jobs: Jobs = 2) -> None:
     """Give commands odd options."""
     with tempfile.TemporaryDirectory() as folder:
-        short = {"contraction-ideal": ["duration=0.05", "checks=[]"]}
-        (log,) = _flown(short, Path(folder)).values()
+        (log,) = _flown(SHORT, Path(folder)).values()
         _attacked("options", _options, cases, seed, jobs, log)
 
 
@@ -66,17 +73,23 @@ def logs(cases: Cases = 10000, seed: Seed = 0, jobs: Jobs = 2, every: Every = Fa
 
 
 @app.command()
-def kills(cases: Cases = 1000, seed: Seed = 0) -> None:
+def kills(cases: Cases = 1000, seed: Seed = 0, jobs: Jobs = 2) -> None:
     """Send flights a signal at a random instant, and look at what their logs have lost."""
     import kills
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # a shell's & and nohup let them be ignored
+    _warm_up()
     found = []
     bad = 0
-    for name, kill in track(islice(kills.cases(seed), cases), "kills", cases):
-        found.append(kills.attempt(kill))
-        if found[-1].trouble:
-            bad += 1
-            print(f"{name}: {found[-1].trouble}", flush=True)
+    with ProcessPoolExecutor(jobs, get_context("fork")) as pool:
+        names, chosen = zip(*islice(kills.cases(seed), cases), strict=True)
+        attempts = zip(names, pool.map(kills.attempt, chosen), strict=True)
+        for name, each in track(attempts, f"kills, seed {seed}", cases):
+            found.append(each)
+            if each.trouble:
+                bad += 1
+                print(f"{name}: {each.trouble}", flush=True)
     print(
         f"kills, seed {seed}: {cases} cases, {bad} with trouble; at most "
         f"{max(each.lost for each in found):.2f} s of wall time lost, a request answered after "
@@ -97,9 +110,10 @@ def _attacked(
     what: str, some: Callable[..., Findings], cases: int, seed: int, jobs: int, *others: Any
 ) -> NoReturn:
     """Attack in ``jobs`` processes, report and exit; ``some`` tries the cases of one batch."""
+    _warm_up()
     began, found = time.monotonic(), Findings()
     batches = [min(BATCH, cases - first) for first in range(0, cases, BATCH)]
-    with ProcessPoolExecutor(jobs) as pool:
+    with ProcessPoolExecutor(jobs, get_context("fork")) as pool:
         tasks = [
             pool.submit(some, f"{seed}-{number}", count, *others)
             for number, count in enumerate(batches)
@@ -116,29 +130,47 @@ def _attacked(
     raise typer.Exit(1 if found else 0)
 
 
+def _warm_up() -> None:
+    """Import and compile here, once, what every command would in its fork of this process."""
+    import mjspace.cli.flights
+    import mjspace.cli.pictures
+    import mjspace.cli.recovery
+    import mjspace.cli.scenarios
+    import mjspace.rendering.render  # noqa: F401
+    from mjspace.plotting.page import plot
+    from mjspace.runner.replay import verify
+    from mjspace.scenario.files import scenario_names
+    from mjspace.scenario.loading import load
+    from mjspace.simulation.assembly import assemble
+    from mjspace.simulation.loop import what_is_compiled
+
+    with warnings.catch_warnings(action="ignore"), tempfile.TemporaryDirectory() as folder:
+        for name in scenario_names():
+            what_is_compiled(assemble(*load(name)))
+        (log,) = _flown(SHORT, Path(folder)).values()
+        verify(log)
+        plot(log, log.with_suffix(".png"))
+
+
 def _scenarios(seed: str, count: int) -> Findings:
     from scenarios import attack, cases
 
-    from mjspace.simulation.block_kernel import block_function
-
-    block_function()  # shared by all forks
     found = Findings()
-    for name, text in islice(cases(seed), count):
-        found += _faults(partial(attack, name, text), name, KEEP / f"{name}.toml", text)
+    with Commands() as commands:
+        for name, text in islice(cases(seed), count):
+            some = partial(attack, name, text, commands=commands)
+            found += _faults(some, name, KEEP / f"{name}.toml", text)
     return found
 
 
 def _options(seed: str, count: int, log: Path) -> Findings:
     from options import attack, cases
 
-    import mjspace.plotting.page
-    import mjspace.rendering.render
-    import mjspace.runner.replay  # noqa: F401
-
     found = Findings()
-    for name, given in islice(cases(seed), count):
-        kept = KEEP / f"{name}.txt"
-        found += _faults(partial(attack, given, log), name, kept, repr(given).encode())
+    with Commands() as commands:
+        for name, given in islice(cases(seed), count):
+            some = partial(attack, given, log, commands=commands)
+            found += _faults(some, name, KEEP / f"{name}.txt", repr(given).encode())
     return found
 
 
@@ -146,25 +178,13 @@ def _logs(seed: str, count: int, bases: dict[str, Path], every: bool) -> Finding
     from log_attack import attack
     from logs import cases
 
-    import mjspace.cli
-    import mjspace.rendering.render
-    import mjspace.runner.report  # noqa: F401
-    from mjspace.plotting.page import plot
-    from mjspace.runner.replay import verify
-
-    for base in set(bases.values()) - _warm:
-        verify(base)  # what is compiled for a flight is then shared by all forks
-        plot(base, base.with_suffix(".png"))
-        _warm.add(base)
     found = Findings()
-    for case in islice(cases(bases, seed), count):
-        name = f"{seed}-{case.name}"
-        kept = KEEP / f"{name}.mcap"
-        found += _faults(partial(attack, case, every=every), name, kept, case.content)
+    with Commands() as commands:
+        for case in islice(cases(bases, seed), count):
+            name = f"{seed}-{case.name}"
+            some = partial(attack, case, commands=commands, every=every)
+            found += _faults(some, name, KEEP / f"{name}.mcap", case.content)
     return found
-
-
-_warm: set[Path] = set()
 
 
 def _faults(

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 from mjspace.algebra import cross, times
@@ -21,10 +20,12 @@ from mjspace.attitude import conjugate, multiply
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
 from ..references.references import Regulation
+from . import riccati
 from .gain_table import GainTable
 from .wheel_momentum import wheel_momentum
 
 _TABLE_STEP = 0.1  # [s] between tabulated gains; 2e-9 of the largest, interpolated
+_MOST_STEPS = 6_000  # in a table, of 2 s: those of a longer turn are longer, its gains as slow
 
 
 class State(NamedTuple):
@@ -74,12 +75,15 @@ def steady_cost(inertia: Array, weights: Weights) -> Array:
 
 
 def linearized(inertia: Array, rate: Array) -> tuple[Array, Array]:
-    """Return A (6, 6) and B (6, 3) of x' = A x + B du about a motion of ``rate`` [rad/s], (3,)."""
+    """Return A (..., 6, 6) and B (6, 3) of x' = A x + B du about a motion.
+
+    The motion has the ``rate`` (..., 3) [rad/s].
+    """
     solve = np.linalg.inv(inertia)
-    A, B = np.zeros((6, 6)), np.zeros((6, 3))
-    A[:3, :3] = solve @ (_skew(inertia @ rate) - _skew(rate) @ inertia)
-    A[3:, :3] = np.eye(3)
-    A[3:, 3:] = -_skew(rate)
+    A, B = np.zeros((*rate.shape[:-1], 6, 6)), np.zeros((6, 3))
+    A[..., :3, :3] = solve @ (_skew(rate @ inertia) - _skew(rate) @ inertia)
+    A[..., 3:, :3] = np.eye(3)
+    A[..., 3:, 3:] = -_skew(rate)
     B[:3] = solve
     return A, B
 
@@ -96,22 +100,13 @@ def cost_to_go(
 ) -> Array:
     """Return P (n, 6, 6) at each ``time`` (n,) [s] by the Riccati differential equation.
 
-    The times increase; P is ``final`` (6, 6) at the last, and is integrated backwards from there.
+    The times increase; P is ``final`` (6, 6) at the last, and is integrated backwards from there,
+    in one step from each time to the one before.
     """
     (Q, R), (_, B) = weights, linearized(inertia, np.zeros(3))
     S = B @ np.linalg.solve(R, B.T)
-
-    def slope(t: float, flat: Array) -> Array:
-        A, _ = linearized(inertia, motion.at(np.array([t])).rate[0])
-        P = flat.reshape(6, 6)
-        return -(P @ A + A.T @ P - P @ S @ P + Q).ravel()
-
-    found = solve_ivp(
-        slope, (time[-1], time[0]), final.ravel(), method="DOP853", t_eval=time[::-1],
-        rtol=1e-9, atol=1e-10,
-    )  # fmt: skip
-    P: Array = found.y.T[::-1].reshape(-1, 6, 6)
-    return P
+    early, late = (linearized(inertia, motion.at(node).rate)[0] for node in riccati.nodes(time))
+    return riccati.backwards(early, late, S, Q, final, time)
 
 
 @dataclass(frozen=True)
@@ -200,7 +195,8 @@ class Tracker(Regulator):
     def _table(self) -> GainTable:
         motion = Regulation(self.angle, self.duration, self.axis)
         final = steady_cost(self.inertia, self.weights)
-        time = np.linspace(0.0, self.duration, 1 + int(np.ceil(self.duration / _TABLE_STEP)))
+        steps = int(np.ceil(min(self.duration / _TABLE_STEP, _MOST_STEPS)))
+        time = np.linspace(0.0, self.duration, 1 + steps)
         P = cost_to_go(self.inertia, self.weights, motion, final, time)
         return GainTable(time, feedback(self.inertia, self.weights, P))
 
@@ -215,5 +211,6 @@ class PrintedTracker(Tracker):
 
 
 def _skew(v: Array) -> Array:
-    """Return the matrix of v x."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    """Return the matrix (..., 3, 3) of v x, of each v (..., 3)."""
+    matrix: Array = np.cross(np.eye(3), v[..., None, :])
+    return matrix

@@ -3,17 +3,20 @@
 The quaternion's path is continuous, as required by a law that chooses q or -q once at its start.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from mjspace import attitude as att
 from mjspace.contract import Array, Gains, Reference, gain
+from mjspace.gufunc import gufunc
 
 _TURN = 0.05  # [rad] of amplitude and phase in a step; 3e-14 rad after 60 s, 7.5e-14 with 0.1
 _BLOCK = 64  # steps
-_MOST_STEPS = 1_000_000  # half a minute of integration, 30 MB
+_MOST_STEPS = 1_000_000  # 5 s of integration, 30 MB
 
 
 @dataclass(frozen=True)
@@ -89,11 +92,8 @@ class Sinusoids(Gains):
             turns = att.from_rotation_vector(
                 self._turn(step * np.arange(n * _BLOCK, (n + 1) * _BLOCK), step)
             )
-            block = np.empty((_BLOCK + 1, 4))
-            block[0] = self._blocks[way, n - 1][-1] if n else att.from_mrp(self.start_mrp)
-            for i, turn in enumerate(turns):
-                block[i + 1] = att.normalize(att.multiply(block[i], turn))
-            self._blocks[way, n] = block
+            first = self._blocks[way, n - 1][-1] if n else att.from_mrp(self.start_mrp)
+            self._blocks[way, n] = np.vstack([first, _turned.ufunc(first, turns)])
         return self._blocks[way, number]
 
     def _rate(self, time: Array) -> Array:
@@ -114,3 +114,20 @@ class Sinusoids(Gains):
         c2 = np.cross(2.0 * a3 + c1, a1) / -60.0
         turn: Array = a1 + a3 / 12.0 + np.cross(a2 + c2, -20.0 * a1 - a3 + c1) / 240.0
         return turn
+
+
+@gufunc(["void(f8[:], f8[:, :], f8[:, :])"], "(q),(n,q)->(n,q)")
+def _turned(first: Any, turns: Any, attitudes: Any) -> None:
+    """Turn an attitude again and again, and keep the product of each turn, normalized."""
+    a, b, c, d = first
+    for i in range(turns.shape[0]):
+        p, q, r, s = turns[i]
+        a, b, c, d = (
+            a * p - b * q - c * r - d * s,
+            a * q + b * p + c * s - d * r,
+            a * r - b * s + c * p + d * q,
+            a * s + b * r - c * q + d * p,
+        )
+        length = math.sqrt(a * a + b * b + c * c + d * d)
+        a, b, c, d = a / length, b / length, c / length, d / length
+        attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3] = a, b, c, d

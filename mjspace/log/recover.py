@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mjspace.errors import InputError, input_error_at
 from mjspace.log import digest
-from mjspace.log.checked import CONTROL_PERIOD, number, span, stamps
+from mjspace.log.checked import CONTROL_PERIOD, event, number, span, stamps
 from mjspace.log.chunk import INDEX, Part
 from mjspace.log.content import Content, message_offsets, unpacked
 from mjspace.log.encoding import HEADER, doubles
@@ -19,6 +19,8 @@ from mjspace.log.file import NAME, LogFile
 from mjspace.log.index import ChunkPlace
 from mjspace.log.salvage import Salvage, salvage
 from mjspace.log.schema import PERIODIC, Shapes, declared
+
+_EVENTS = "/events"
 
 
 class Recovered(NamedTuple):
@@ -36,6 +38,8 @@ class Recovered(NamedTuple):
     lost_attachments: list[str]
     lost_metadata: list[str]
     """Keys that were left out because the rows contradict them."""
+    lost_topics: list[str]
+    """Topics that were left out because mjspace would not read them."""
 
     @property
     def lost(self) -> str:
@@ -46,6 +50,7 @@ class Recovered(NamedTuple):
         ]
         parts = [f"attachment {name}" for name in self.lost_attachments]
         parts += [f"metadata {key}" for key in self.lost_metadata]
+        parts += self.lost_topics
         count = [f"{self.lost_bytes:,} bytes"] if self.lost_bytes or spans else []
         return ", ".join([*count, *spans, *parts])
 
@@ -81,6 +86,10 @@ def recover(path: Path, out: Path) -> Recovered:
     dtypes = {found.channels[t].id: doubles(s).record(0).dtype for t, (s, *_) in topics.items()}
     every = {found.channels[topic].id: every for topic, (*_, every) in topics.items()}
     most_often = min(every, key=every.__getitem__, default=-1)
+    lost_topics = []
+    if not _readable_events(path, found):
+        lost_topics = [_EVENTS]
+        found = found._replace(channels={t: c for t, c in found.channels.items() if t != _EVENTS})
     kept, lost_bytes = _in_order(path, found, dtypes, most_often)
     if not any(one.ends for one in kept):
         raise InputError(f"{path}: nothing of a flight can be saved: it has no whole chunk")
@@ -94,9 +103,27 @@ def recover(path: Path, out: Path) -> Recovered:
         _gaps(kept, every[most_often], found),
         sorted(found.expected_attachments - found.attachments.keys()),
         lost_metadata,
+        lost_topics,
     )
     _write(path, out, found, kept, result)
     return result
+
+
+def _readable_events(path: Path, found: Salvage) -> bool:
+    """Tell whether all entries of /events are that: another topic's channel may have its name."""
+    if _EVENTS not in found.channels:
+        return True
+    channel = found.channels[_EVENTS].id
+    with path.open("rb") as file:
+        for place in found.chunks:
+            data = unpacked(file, place)
+            content = Content(data, message_offsets(data, [channel]))
+            try:
+                for record in content.records(channel):
+                    event(record)
+            except ValueError:
+                return False
+    return True
 
 
 def _in_order(

@@ -39,8 +39,8 @@ def plot(log: Log | Path | str, output: Path | str, *, signals: Sequence[str] = 
         raise ValueError(f"output {str(output)!r}: end it in .png")
     with matplotlib.rc_context(STYLE):
         page = figure(log, signals)
-        with whole_or_none(output):
-            page.savefig(output, dpi=110, facecolor="white")
+        with whole_or_none(output) as file:
+            page.savefig(file, dpi=110, facecolor="white")
 
 
 def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:

@@ -37,8 +37,8 @@ def plot(log: Log | Path | str, output: Path | str, x: str, y: str) -> None:
         raise ValueError(f"output {str(output)!r}: end it in .png")
     with matplotlib.rc_context(STYLE):
         plane = figure(Log.of(log), x, y)
-        with whole_or_none(output):
-            plane.savefig(output, dpi=130, facecolor="white")
+        with whole_or_none(output) as file:
+            plane.savefig(file, dpi=130, facecolor="white")
 
 
 def figure(log: Log, x: str, y: str) -> Figure:

@@ -60,9 +60,9 @@ def render(
         )
     if output.suffix == ".png":
         times: Array = np.array([_still_time(log, at)])
-        for frame in _frames(log, times, camera, size):
-            with whole_or_none(output):
-                Image.fromarray(frame).save(output)
+        (frame,) = _frames(log, times, camera, size)
+        with whole_or_none(output) as file:
+            Image.fromarray(frame).save(file, format="png")
         return
     period = speed / rate
     if not (log.end - log.start) / period < _MOST_FRAMES:

@@ -10,6 +10,8 @@ import numpy as np
 from av.video.reformatter import Colorspace
 from numpy.typing import NDArray
 
+from mjspace.errors import whole_or_none
+
 Frame = NDArray[np.uint8]
 """An image, shape (height, width, 3), RGB, first row at the top."""
 
@@ -44,6 +46,8 @@ class Video:
         # Without these, players guess the colours from the picture's size.
         context = self._stream.codec_context
         context.colorspace = context.color_primaries = context.color_trc = BT709
+        with whole_or_none(path):
+            pass  # it is opened by its name with the first picture, and again for the index
 
     def write(self, frame: Frame) -> None:
         """Append a frame."""

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -19,6 +18,7 @@ from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.log.rows import due
 from mjspace.log.writer import nanoseconds
+from mjspace.runner import scratch
 from mjspace.runner.former_names import as_logged, logged_name
 from mjspace.runner.logged_code import (
     code_of,
@@ -202,10 +202,10 @@ def assembly_of(
         require_trust(code)
         if law is None:
             refuse_connection(scenario)
-    with tempfile.TemporaryDirectory() as own:
-        unpack(code | model, Path(own))
+    with scratch.folder() as own:
+        unpack(code | model, own)
         law_folder = None if law is None else folder
-        assembly = assemble(scenario, Path(own), trust=trust, law_folder=law_folder)
+        assembly = assemble(scenario, own, trust=trust, law_folder=law_folder)
         flown = logged_model(
             assembly.vehicle.model,
             log.attachment("model.mjb.gz"),

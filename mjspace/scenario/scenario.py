@@ -25,6 +25,8 @@ from mjspace.scenario.region import Region
 from mjspace.scenario.sensors import Sensors, check_sensors
 from mjspace.units import Quantity, to_si, whole_number
 
+_MOST_STEPS = 100_000  # in a control period: seconds of wall time
+
 
 class Component(BaseModel):
     """A law or a reference: ``kind`` names a class, every other key is one of its gains."""
@@ -207,13 +209,15 @@ class Scenario(Table):
 
     @model_validator(mode="after")
     def _whole_periods(self, info: ValidationInfo) -> "Scenario":
-        step = self.rates.physics
-        spans: dict[str, float | None] = {"rates.control": self.rates.control}
+        step, steps = self.rates.physics, self.rates.steps
+        if steps > _MOST_STEPS:
+            raise ValueError(
+                f"rates.control: {self.rates.control:.10g} s has {steps} steps of rates.physics, "
+                f"{step:.10g} s: should be at most {_MOST_STEPS}"
+            )
         for name, sensor in self.sensors.items():
-            spans[f"sensors.{name}.period"] = sensor.period
-        for key, span in spans.items():
-            if span is not None:
-                whole_number(span, step, key, "rates.physics")
+            if sensor.period is not None:
+                whole_number(sensor.period, step, f"sensors.{name}.period", "rates.physics")
         if not _is_flown(info):
             whole_number(self.duration, self.rates.control, "duration", "rates.control")
         self.log.every(self.rates.control)

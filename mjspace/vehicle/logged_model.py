@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjspace.errors import InputError
-from mjspace.vehicle.vehicle import from_mjb, to_mjb
+from mjspace.vehicle.vehicle import from_mjb, saved, to_mjb
 
 _SPARE = 1 << 16  # for paths of files, which depend on where mjspace is installed
 
@@ -87,8 +87,8 @@ def _numbers_of(mjb: bytes, here: Any, own: bytes) -> bytes | None:
 
     The names of the files that were compiled, and what tells where they are, may differ.
     """
-    start = own.rfind(here.paths)
-    stop = start + here.npaths
+    paths = saved(here)[1]
+    start, stop = paths.start, paths.stop
     longer = len(mjb) - len(own)
     if here.npaths + longer < 0:
         return None

@@ -194,10 +194,21 @@ def _set_joints(model: Any, data: Any, initial: Initial) -> None:
 
 
 def to_mjb(model: Any) -> bytes:
-    """Return the compiled model as MJB: equal models give equal bytes."""
+    """Return the compiled model as MJB: equal models give equal bytes.
+
+    The paths of the files that were compiled are blank: they tell where somebody keeps them.
+    """
+    mjb, paths = saved(model)
+    return mjb[: paths.start] + bytes(model.npaths) + mjb[paths.stop :]
+
+
+def saved(model: Any) -> tuple[bytes, slice]:
+    """Return a compiled model as MuJoCo saves it, and where in that its files' paths are."""
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
+    mjb = buffer.tobytes()
+    start = mjb.rfind(model.paths)
+    return mjb, slice(start, start + model.npaths)
 
 
 def packed(mjb: bytes) -> bytes:

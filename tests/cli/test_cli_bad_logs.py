@@ -119,7 +119,7 @@ def test_a_law_that_raises_in_its_reset_is_one_line_with_its_place(
     for rest in (("--verify",), ("--out", "out", "--from", "0.02")):
         status, said = command("replay", "x.mcap", "--trust", *rest)
         assert status == 2
-        assert said == "mjspace: log: the law raised ArithmeticError at law.py:10: no\n"
+        assert said == "mjspace: log: the law raised ArithmeticError at law.py:12: no\n"
     assert not os.path.exists("out")
 
 

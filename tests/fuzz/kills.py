@@ -27,8 +27,8 @@ SCENARIOS = (
     *("contraction-ideal", "contraction-noise", "detumble-wheels", "dgvscmg-ideal", "lander"),
     *("wheel-failure", "rcs-schmitt", "yo-yo-despin", "b-dot", "pd-plus"),
 )
-LATEST = 4.0
-"""The signal comes until then [s]; a process that flies them all takes longer to begin."""
+LATEST = 2.0
+"""The signal comes until then [s]; ten times as late where one process more has to begin first."""
 LOST = 1.0
 """What a kill may cost [s] of wall time."""
 ANSWERED = 2.0
@@ -71,7 +71,7 @@ def cases(seed: int) -> Iterator[tuple[str, Kill]]:
         kind = signal.SIGKILL if chance.random() < 0.7 else chance.choice(requests)
         everything = chance.random() < 0.04
         scenario = ALL if everything else chance.choice(SCENARIOS)
-        delay = chance.uniform(0.0, LATEST * (5.0 if everything else 1.0))
+        delay = chance.uniform(0.0, LATEST * (10.0 if everything else 1.0))
         name = f"seed {seed}, case {number}: {scenario}, {kind.name} after {delay:.3f} s"
         yield name, Kill(scenario, kind, delay)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from random import Random
 
 from logs import Case
-from outcomes import faults, outcome, written
+from outcomes import Commands, faults, written
 
 COMMANDS = {
     "info": ("info", "x.mcap"),
@@ -24,8 +24,8 @@ LITTLE = ("info", "recover", "verify")
 OTHERS = (*("json",) * 3, *("replay",) * 4, "plot", "render")
 
 
-def attack(case: Case, folder: Path, *, every: bool) -> Iterator[str]:
-    """Yield the faults of the commands on a ``case``, in the empty ``folder``.
+def attack(case: Case, folder: Path, commands: Commands, *, every: bool) -> Iterator[str]:
+    """Yield the faults of the ``commands`` on a ``case``, in the empty ``folder``.
 
     ``every`` command, or those that take little time and one other.
     """
@@ -33,7 +33,7 @@ def attack(case: Case, folder: Path, *, every: bool) -> Iterator[str]:
     random = Random(case.name)
     for name in COMMANDS if every else (*LITTLE, random.choice(OTHERS)):
         before = written(folder)
-        found = outcome(COMMANDS[name], folder)
+        found = commands.outcome(COMMANDS[name], folder)
         for fault in faults(found):
             yield f"{name}: {fault}"
         extra = written(folder) - before
@@ -44,7 +44,7 @@ def attack(case: Case, folder: Path, *, every: bool) -> Iterator[str]:
         if name == "verify" and found.status == 0 and case.must_differ:
             yield "verify: a poisoned log is called identical"
         if name == "recover" and found.status == 0:
-            read = outcome(("info", "good.mcap"), folder)
+            read = commands.outcome(("info", "good.mcap"), folder)
             if read.status or faults(read):
                 yield f"recover: what it wrote is not read: {read.error.strip()[:200]}"
         for left in written(folder) - before:

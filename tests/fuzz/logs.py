@@ -89,13 +89,7 @@ def order(random: Random, log: Parts) -> bytes:
     found = list(parts.pieces(log))
     for _ in range(random.randint(1, 3)):
         i, j = random.randrange(len(found)), random.randrange(len(found))
-        kind = random.randrange(3)
-        if kind == 0:
-            del found[i]
-        elif kind == 1:
-            found.insert(i, found[j])
-        else:
-            found[i], found[j] = found[j], found[i]
+        _reordered(found, i, j, random.randrange(3))
     return parts.MAGIC + b"".join(found) + parts.ending(log)
 
 
@@ -156,12 +150,8 @@ def messages(random: Random, log: Parts) -> Parts:
         chunk = random.choice(log.chunks)
         i, j = random.randrange(len(chunk)), random.randrange(len(chunk))
         kind = random.randrange(5)
-        if kind == 0:
-            del chunk[i]
-        elif kind == 1:
-            chunk.insert(i, chunk[j])
-        elif kind == 2:
-            chunk[i], chunk[j] = chunk[j], chunk[i]
+        if kind < 3:
+            _reordered(chunk, i, j, kind)
         elif kind == 3:
             chunk[i] = _spoilt(random, chunk[i])
         else:
@@ -280,6 +270,16 @@ MUTATIONS: tuple[Callable[[Random, Parts], Parts | bytes], ...] = (
     *(flips, cut, order, lengths, numbers, chunks, messages, messages, state, state, state),
     *(attachments, attachments, metadata, channels, channels),
 )
+
+
+def _reordered(items: list[bytes], i: int, j: int, kind: int) -> None:
+    """Remove one, repeat one or swap two."""
+    if kind == 0:
+        del items[i]
+    elif kind == 1:
+        items.insert(i, items[j])
+    else:
+        items[i], items[j] = items[j], items[i]
 
 
 def _spoilt(random: Random, content: bytes) -> bytes:

@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from outcomes import faults, outcome
+from outcomes import Commands, faults
 
 from mjspace.errors import is_plain
 
@@ -119,12 +119,12 @@ def words(draw: random.Random) -> list[str]:
     return given
 
 
-def attack(given: list[str], log: Path, folder: Path) -> Iterator[str]:
+def attack(given: list[str], log: Path, folder: Path, commands: Commands) -> Iterator[str]:
     """Yield the faults of a command beside a copy of the ``log``, in the empty ``folder``."""
     shutil.copy(log, folder / "flight.mcap")
     text = 'base = "contraction-ideal"\nchecks = []\nduration = 0.02\n'
     (folder / "x.toml").write_text(text)
-    found = outcome(given, folder)
+    found = commands.outcome(given, folder)
     usage = found.status == 2 and found.error.startswith("Usage:")
     yield from (f"{given}: {fault}" for fault in faults(found) if not usage)
     if not is_plain(found.error.replace("\n", "")):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
-from outcomes import faults, outcome, written
+from outcomes import Commands, faults, written
 
 from mjspace.scenario import files
 
@@ -142,12 +142,13 @@ def _places(value: Any) -> Iterator[tuple[Any, Any]]:
             yield from _places(value[key])
 
 
-def attack(name: str, text: bytes, folder: Path) -> Iterator[str]:
+def attack(name: str, text: bytes, folder: Path, commands: Commands) -> Iterator[str]:
     """Yield the faults of beginning the flight of a scenario, in the empty ``folder``."""
     (folder / "case.toml").write_bytes(text)
     begin = "info", "case.toml", "--compiled"
     fly = "run", "case.toml", "--duration", "0.02", "--out", "out"
-    found = outcome(begin if random.Random(name).random() < 0.8 else fly, folder)
+    given = begin if random.Random(name).random() < 0.8 else fly
+    found = commands.outcome(given, folder)
     yield from faults(found)
     extra = written(folder) - {"case.toml"}
     if extra - {"out"} or (extra and found.status == 2):

@@ -1,12 +1,14 @@
 """Damaged, foreign and hostile logs: one line, status 2, and nothing poisoned is identical."""
 
 import warnings
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
 import log_attack
 import logs
 import pytest
+from outcomes import Commands
 
 import mjspace
 
@@ -15,6 +17,12 @@ import mjspace
 def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """A renderer that other tests have used in this process hangs in a fork of it."""
     monkeypatch.setattr(log_attack, "OTHERS", ("json", "replay"))
+
+
+@pytest.fixture
+def commands() -> Iterator[Commands]:
+    with Commands() as found:
+        yield found
 
 
 @pytest.fixture(scope="module")
@@ -30,21 +38,23 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return flown
 
 
-def test_no_damage_to_a_log_is_a_traceback(bases: dict[str, Path], tmp_path: Path) -> None:
+def test_no_damage_to_a_log_is_a_traceback(
+    bases: dict[str, Path], tmp_path: Path, commands: Commands
+) -> None:
     for case in islice(logs.cases(bases, 0), 6):
         folder = tmp_path / case.name
         folder.mkdir()
-        assert not list(log_attack.attack(case, folder, every=False)), case.name
+        assert not list(log_attack.attack(case, folder, commands, every=False)), case.name
 
 
 def test_what_is_changed_is_repaired_but_for_the_change(
-    bases: dict[str, Path], tmp_path: Path
+    bases: dict[str, Path], tmp_path: Path, commands: Commands
 ) -> None:
     """So that what reads a log meets the change, and not a checksum before it."""
     for name, path in bases.items():
         anew = logs.parts.joined(logs.parts.parts_of(path, 5))
         case = logs.Case(name, anew)
         (tmp_path / name).mkdir()
-        assert not list(log_attack.attack(case, tmp_path / name, every=False))
+        assert not list(log_attack.attack(case, tmp_path / name, commands, every=False))
         (tmp_path / f"{name}.mcap").write_bytes(anew)
         assert mjspace.verify(tmp_path / f"{name}.mcap") is None

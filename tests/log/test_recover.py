@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from log_samples import ATTACHMENTS, BLOCKS, METADATA, fly, rows
+from log_samples import ATTACHMENTS, BLOCKS, METADATA, fly, rewritten, rows
 from mcap.reader import make_reader
 
 from mjspace.errors import InputError
@@ -112,6 +112,22 @@ def test_an_attachment_that_is_damaged_is_named(whole: Path) -> None:
     assert found.lost_attachments == ["scenario.toml"]
     assert found.attachments == ["empty"]
     assert log.attachments == ("empty",)
+
+
+def test_events_that_cannot_be_read_are_left_out(whole: Path) -> None:
+    """As where the channel of another topic has their name."""
+
+    def change(topic: str, number: int, data: bytes) -> bytes:
+        return b"\xff" + data if topic == "/events" and number == 1 else data
+
+    foreign = rewritten(whole, whole.with_name("foreign.mcap"), change)
+    with pytest.raises(InputError, match="/events is not laid out"):
+        Log(foreign).events()
+    found, log = saved(whole, foreign.read_bytes())
+    assert found.lost_topics == ["/events"]
+    assert log.metadata["recovered"] == "lost /events"
+    assert log.events() == []
+    assert_rows(log, np.arange(sum(BLOCKS)))
 
 
 @settings(max_examples=40, deadline=None)

@@ -271,6 +271,18 @@ def test_a_full_disk_is_named_and_leaves_no_picture(pictured_log: Path, tmp_path
     assert not (tmp_path / "x.png").exists()
 
 
+@pytest.mark.parametrize("linked", [Path.symlink_to, Path.hardlink_to])
+def test_a_link_is_not_followed(linked: Any, pictured_log: Path, tmp_path: Path) -> None:
+    target, link = tmp_path / "precious", tmp_path / "x.png"
+    target.write_text("mine")
+    linked(link, target)
+    plot(pictured_log, link, signals=["truth.rate"])
+    plot(pictured_log, link, signals=["truth.rate"])  # a picture from before is replaced
+    assert link.read_bytes().startswith(b"\x89PNG")
+    assert not link.is_symlink()
+    assert target.read_text() == "mine"
+
+
 def test_bad_input_is_refused(pictured_log: Path, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"end it in \.png"):
         plot(pictured_log, tmp_path / "x.pdf")

@@ -74,6 +74,12 @@ def test_a_full_disk_is_named_and_leaves_no_picture(flown: Path, tmp_path: Path)
     assert not (tmp_path / "x.png").exists()
 
 
+def test_a_link_is_not_followed(flown: Path, tmp_path: Path) -> None:
+    (tmp_path / "x.png").symlink_to(tmp_path / "precious")
+    plot(flown, tmp_path / "x.png", "law.angle", "truth.rate[0]")
+    assert [path.name for path in tmp_path.iterdir()] == ["x.png"]
+
+
 def test_bad_input_is_refused(flown: Path, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"end it in \.png"):
         plot(flown, tmp_path / "x.svg", "law.angle", "law.angle_rate")

@@ -3,7 +3,7 @@
 import gzip
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,9 @@ from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering import overlay
 from mjspace.rendering.offscreen import Canvas
-from mjspace.rendering.render import captions, nearest_rows, render, shares_of_thrust
+from mjspace.rendering.render import _frames, captions, nearest_rows, render, shares_of_thrust
 from mjspace.rendering.scene import Stage
-from mjspace.rendering.video import Video
+from mjspace.rendering.video import Frame, Video
 from mjspace.vehicle.vehicle import from_mjb
 
 SIZE = 320, 180
@@ -248,6 +248,18 @@ def test_a_full_disk_is_named_and_leaves_no_picture(
     assert not path.exists()
 
 
+@needs_opengl
+@pytest.mark.parametrize("name", ["x.png", "x.mp4"])
+def test_a_link_is_not_followed(pictured_log: Path, tmp_path: Path, name: str) -> None:
+    target, link = tmp_path / "precious", tmp_path / name
+    target.write_text("mine")
+    link.symlink_to(target)
+    render(pictured_log, link, size=(64, 48), rate=2.0)
+    assert not link.is_symlink()
+    assert link.stat().st_size > 100
+    assert target.read_text() == "mine"
+
+
 @pytest.mark.parametrize(
     ("output", "wrong", "said"),
     [
@@ -269,6 +281,20 @@ def test_bad_input_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=said):
         render(pictured_log, tmp_path / output, **wrong)
+    assert not list(tmp_path.iterdir())
+
+
+@needs_opengl
+def test_a_log_that_is_damaged_further_on_leaves_no_still(
+    pictured_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def damaged(*arguments: Any) -> Iterator[Frame]:
+        yield from _frames(*arguments)
+        raise ValueError("time does not go on")
+
+    monkeypatch.setattr("mjspace.rendering.render._frames", damaged)
+    with pytest.raises(ValueError, match="time does not go on"):
+        render(pictured_log, tmp_path / "x.png", size=(64, 48))
     assert not list(tmp_path.iterdir())
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from blocks import blocks_of
 from log_samples import rewritten
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -19,7 +20,6 @@ from mjspace.runner import report
 from mjspace.runner.replay import replay, verify
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
-from mjspace.simulation import loop
 from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
 pytestmark = pytest.mark.filterwarnings(
@@ -45,9 +45,7 @@ ROWS = 112
 @pytest.fixture(scope="module", autouse=True)
 def _many_blocks() -> Iterator[None]:
     """Blocks of 7 periods: most of them have no row of the slower topics."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "BLOCK_PERIODS", 7)
-        patch.setattr(loop, "BLOCK_SECONDS", np.inf)
+    with blocks_of(7):
         yield
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from blocks import blocks_of
 from full_disk import room_for
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -47,9 +48,7 @@ OVERRIDES = [
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Log:
     """51 periods in blocks of 16: frames at every fifth of them, at other places in each block."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "BLOCK_PERIODS", 16)
-        patch.setattr(loop, "BLOCK_SECONDS", np.inf)
+    with blocks_of(16):
         out = tmp_path_factory.mktemp("recorded")
         return run("contraction-adaptive", overrides=OVERRIDES, out=out).log
 
@@ -156,10 +155,10 @@ def test_the_verdict_stands_at_the_end_of_the_log(log: Log) -> None:
 
 
 @pytest.fixture
-def slow_disk(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     """Blocks of 8 periods, written only when the flight is as far ahead as it may be.
 
-    Returns, for each chunk, how many blocks the flight had flown then.
+    Yields, for each chunk, how many blocks the flight had flown then.
     """
     flown = 0
     seen: list[int] = []
@@ -180,11 +179,10 @@ def slow_disk(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         seen.append(flown)
         return encode(parts, position)
 
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", 8)
-    monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
     monkeypatch.setattr("mjspace.runner.run.fly", counted)
     monkeypatch.setattr("mjspace.log.file.encode", slow)
-    return seen
+    with blocks_of(8):
+        yield seen
 
 
 TURNS = "checks=[{name='turns',signal='truth.rate[0]',statistic='final',below=9}]"
@@ -215,16 +213,17 @@ def test_what_a_slow_disk_gets_is_what_flew_and_was_judged(
 
 @pytest.mark.parametrize("periods", [24, 41], ids=["in a chunk", "in the summary"])
 def test_a_disk_that_fills_up_ends_the_flight_and_what_fitted_is_kept(
-    periods: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    periods: int, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", 8)
-    whole = run("detumble-wheels", overrides=SHORT, out=tmp_path / "whole").path
+    with blocks_of(8):
+        whole = run("detumble-wheels", overrides=SHORT, out=tmp_path / "whole").path
     with whole.open("rb") as file:
         summary = make_reader(file).get_summary()
     assert summary is not None
     fourth = summary.chunk_indexes[3].chunk_start_offset
     room = fourth + 100 if periods == 24 else whole.stat().st_size - 1
-    with room_for(room), pytest.raises(OSError, match=r"File too large: '.*flight\.mcap'"):
+    full = pytest.raises(OSError, match=r"File too large: '.*flight\.mcap'")
+    with blocks_of(8), room_for(room), full:
         run("detumble-wheels", overrides=SHORT, out=tmp_path / "full")
     log = Log(tmp_path / "full/flight.mcap")
     assert (log.complete, len(log)) == (False, periods)

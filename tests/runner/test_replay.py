@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from blocks import blocks_of
 from log_samples import rewritten
 from mjspace.controllers.landing import lander_estimator
 
@@ -193,16 +194,13 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 
 @pytest.mark.parametrize("topic", ["/state", "/truth", "/measurement", "/command", "/law"])
-def test_one_bit_of_any_field_is_named(
-    everything: Result, tmp_path: Path, topic: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_bit_of_any_field_is_named(everything: Result, tmp_path: Path, topic: str) -> None:
     """The digests name the topic; without them, the flight again names field and time."""
-    # Also where it differs in a block other than the first.
-    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", 7)
     log = everything.log
     for field in log.topics[topic]:
         path = changed_log(log, tmp_path / "one.mcap", topic, field, 30, digests=False)
-        found = verify(path)
+        with blocks_of(7):  # also where it differs in a block other than the first
+            found = verify(path)
         assert found is not None, field
         assert (found.topic, found.field, found.index) == (topic, field, 0)
         assert found.time == pytest.approx(0.03, abs=1e-9)
@@ -262,13 +260,12 @@ def test_progress_is_told_to_the_end_of_the_log_and_no_further(
     """Also where the flight was interrupted: it is not flown on to the end of its scenario."""
     from mjspace.runner import replay as module
 
-    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_SECONDS", np.inf)
-    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", 150)
     longer = scenario_of(noisy.log).model_copy(update={"duration": 0.8})
     for flown in (scenario_of(noisy.log), longer):
         monkeypatch.setattr(module, "scenario_of", lambda _, flown=flown: flown)
         told: list[float] = []
-        assert verify(noisy.path, progress=told.append) is None
+        with blocks_of(150):
+            assert verify(noisy.path, progress=told.append) is None
         assert told == pytest.approx([0.149, 0.299, min(0.449, flown.duration)])
 
 
@@ -373,8 +370,8 @@ def test_a_log_that_ends_with_a_block_is_verified_to_its_end(
     longer = scenario_of(noisy.log).model_copy(update={"duration": 0.8})
     monkeypatch.setattr(module, "scenario_of", lambda _: longer)
     for periods in (401, 200, 7):
-        monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", periods)
-        assert verify(noisy.path) is None
+        with blocks_of(periods):
+            assert verify(noisy.path) is None
 
 
 def test_a_cut_log_is_verified_as_far_as_it_goes(noisy: Result, tmp_path: Path) -> None:

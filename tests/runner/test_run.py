@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from blocks import blocks_of
 
 from mjspace.errors import InputError
 from mjspace.runner.run import output_folder, run
-from mjspace.simulation import loop
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block
 
@@ -24,9 +23,9 @@ SHORT = [
 
 
 @pytest.fixture(autouse=True)
-def _many_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", 8)
-    monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
+def _many_blocks() -> Iterator[None]:
+    with blocks_of(8):
+        yield
 
 
 def test_progress_is_the_time_of_each_block_and_the_verdict_of_the_whole_log(

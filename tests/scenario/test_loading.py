@@ -309,6 +309,13 @@ def test_a_duration_is_a_whole_number_of_control_periods(minimal: Path) -> None:
     load(minimal, ["duration=20", "rates.control=0.1"])  # 0.1 is no binary fraction
 
 
+def test_a_control_period_has_not_more_steps_than_can_be_waited_for(minimal: Path) -> None:
+    message = refusal(minimal, "rates.physics=1e-9", "rates.control='10 ms'")
+    assert "rates.control: 0.01 s has 10000000 steps of rates.physics, 1e-09 s" in message
+    assert message.endswith("should be at most 100000")
+    load(minimal, ["rates.physics=1e-7", "rates.control='10 ms'"])
+
+
 def test_component_from_the_command_line() -> None:
     law = component("contraction:Ideal", ["rate_gain=3", "inertia=[[1,0,0],[0,1,0],[0,0,1]]"])
     assert law.gains == {"rate_gain": 3, "inertia": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}

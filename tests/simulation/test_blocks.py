@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from blocks import blocks_of
 
 from mjspace.contract import Event
 from mjspace.scenario.files import scenario_names
@@ -52,9 +53,7 @@ def flown(built: Assembly, members: tuple[int, ...] = (0, 1), threads: int = 1) 
 @pytest.fixture(scope="module")
 def whole(eventful: Assembly) -> Flown:
     """The flight in one block."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "BLOCK_SECONDS", np.inf)
-        patch.setattr(loop, "BLOCK_PERIODS", 500)
+    with blocks_of(500):
         assert len(list(fly(eventful, first_start(eventful, (0, 1)), (0, 1)))) == 1
         return flown(eventful)
 
@@ -75,11 +74,10 @@ def test_what_lasts_is_told_once(eventful: Assembly, whole: Flown) -> None:
 
 @pytest.mark.parametrize("periods", [1, 7, 120])
 def test_block_length_changes_no_bit_and_no_event(
-    periods: int, eventful: Assembly, whole: Flown, monkeypatch: pytest.MonkeyPatch
+    periods: int, eventful: Assembly, whole: Flown
 ) -> None:
-    monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", periods)
-    assert flown(eventful) == whole
+    with blocks_of(periods):
+        assert flown(eventful) == whole
 
 
 def test_a_machine_that_is_too_slow_changes_neither(

@@ -6,7 +6,8 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from compiled_flights import assembly, assert_same, flown, one_of
+from blocks import blocks_of
+from compiled_flights import SHORT_BLOCKS, assembly, assert_same, flown, one_of
 
 from mjspace.environment.install import install_callbacks
 from mjspace.sensors.suite import SensorSuite
@@ -15,17 +16,8 @@ from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.initial_state import INTEGRATION, Start, first_start
 from mjspace.simulation.stepper import Stepper
 from mjspace.tracing.inner_loops import Untraceable
-from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
-pytestmark = pytest.mark.filterwarnings(
-    f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
-)
-
-
-@pytest.fixture(autouse=True)
-def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", 40)
-    monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
+pytestmark = SHORT_BLOCKS
 
 
 ALL = "compiled: sensors, law, actuators and step effects ({})"
@@ -217,7 +209,6 @@ class Law(VariableStructure):
 def test_a_law_that_is_called_in_python_is_called_once_where_something_happens(
     sensors: bool, periods: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", periods)
     if not sensors:
         without_compiled_sensors(monkeypatch)
     flights = []
@@ -227,7 +218,8 @@ def test_a_law_that_is_called_in_python_is_called_once_where_something_happens(
         (folder / "own.py").write_text(COUNTS)
         own = "law.kind='own.py:Law'"
         built = assembly("lander", *CRASHES, SELDOM, own, folder=folder)
-        flights.append(flown(built, compiled=compiled))
+        with blocks_of(periods):
+            flights.append(flown(built, compiled=compiled))
     assert ("sensors and law called in Python" in flights[0].compiled) is not sensors
     assert "law called in Python" in flights[0].compiled
     assert len(flights[1].events) >= 2

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from compiled_flights import assembly, assert_same, flown, one_of
+from compiled_flights import SHORT_BLOCKS, assembly, assert_same, flown, one_of
 from mujoco.batch import SimulationError
 
 from mjspace.simulation import loop
@@ -19,18 +19,19 @@ from mjspace.simulation.initial_state import Start, first_start
 from mjspace.simulation.stepper import Stepper
 from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
-pytestmark = pytest.mark.filterwarnings(
-    f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
-)
-
-
-@pytest.fixture(autouse=True)
-def _short_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop, "BLOCK_PERIODS", 40)
-    monkeypatch.setattr(loop, "BLOCK_SECONDS", np.inf)
+pytestmark = SHORT_BLOCKS
 
 
 WHOLE = "compiled: sensors, law and actuators"
+
+
+def flying(source: str, folder: Path, *overrides: str, name: str = "contraction-ideal") -> Assembly:
+    """Return a flight of 0.1 s with a law of one's own, whose ``source`` is put into a file."""
+    (folder / "own.py").write_text(source)
+    law = "law={kind='own.py:Law'}"
+    return assembly(name, "duration=0.1", law, *overrides, folder=folder)
+
+
 SCENARIOS = {
     "contraction-adaptive": ["duration=0.2", "plant.wheels.torque_limit=5"],
     "dgvscmg-tracking": ["duration=0.1"],
@@ -100,12 +101,8 @@ class Law(Cascade):
 def test_an_inner_loop_has_the_time_of_each_step_and_the_sensors_last_report(
     trouble: str, what: str, tmp_path: Path
 ) -> None:
-    (tmp_path / "own.py").write_text(INNER.replace("TROUBLE", trouble))
-    built = assembly(
-        "dgvscmg-tracking",
-        *("duration=0.05", "law={kind='own.py:Law'}", "sensors.wheel_speed.noise_std=0.001"),
-        folder=tmp_path,
-    )
+    more = ["duration=0.05", "sensors.wheel_speed.noise_std=0.001"]
+    built = flying(INNER.replace("TROUBLE", trouble), tmp_path, *more, name="dgvscmg-tracking")
     compiled = flown(built)
     assert re.fullmatch(what, compiled.compiled)
     assert_same(compiled, flown(built, compiled=False))
@@ -267,10 +264,7 @@ class Law:
 
 
 def own_law(folder: Path, trouble: str = "", duration: float = 0.2, *more: str) -> Assembly:
-    (folder / "own.py").write_text(HEAD.replace("{trouble}", trouble))
-    return assembly(
-        "contraction-ideal", f"duration={duration}", "law={kind='own.py:Law'}", *more, folder=folder
-    )
+    return flying(HEAD.replace("{trouble}", trouble), folder, f"duration={duration}", *more)
 
 
 def test_an_unbatched_law_of_ones_own_is_compiled(tmp_path: Path) -> None:
@@ -313,10 +307,7 @@ def test_what_a_called_law_returns_may_be_any_numbers(result: str, tmp_path: Pat
     built = own_law(tmp_path)
     source = HEAD.replace("{trouble}", "assert time >= 0.0")
     place = "        return State(integral, slowed), TorqueCommand"
-    (tmp_path / "own.py").write_text(source.replace(place, f"        {result}\n{place}"))
-    built = assembly(
-        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
-    )
+    built = flying(source.replace(place, f"        {result}\n{place}"), tmp_path)
     called, python = flown(built, (0, 1), threads=2), flown(built, (0, 1), compiled=False)
     assert "law called in Python" in called.compiled
     assert_same(called, python)
@@ -330,9 +321,7 @@ def test_a_called_law_of_many_vehicles_is_pythons(
     source = BATCHED.replace('torque.astype(str) + "?"', "0.5 * torque")
     if not batched:
         source = source.replace("batched = True", "batched = False")
-    (tmp_path / "own.py").write_text(source)
-    law = "law={kind='own.py:Law'}"
-    built = assembly("contraction-noise", "duration=0.1", law, *errors, folder=tmp_path)
+    built = flying(source, tmp_path, *errors, name="contraction-noise")
     members = (0, 1, 2)
     python = flown(built, members, compiled=False)
     for threads in (1, 2):
@@ -376,10 +365,7 @@ class Law:
 def test_what_a_called_law_keeps_does_not_change_and_its_own_arrays_are_copied(
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "own.py").write_text(KEEPING)
-    built = assembly(
-        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
-    )
+    built = flying(KEEPING, tmp_path)
     rows, law = flown(built).rows, getattr(built.law, "law")  # noqa: B009 - the user's own
     assert len(rows["/truth.rate"]) == 101
     np.testing.assert_array_equal(
@@ -404,10 +390,7 @@ def test_a_called_laws_change_of_shape_ends_the_flight_as_in_python(tmp_path: Pa
     # To a shape that would be broadcast to the one before.
     built = own_law(tmp_path, "error = error if time < 0.0605 else error[:1]")
     source = (tmp_path / "own.py").read_text()
-    (tmp_path / "own.py").write_text(source.replace("np.concatenate([error, size[None]])", "error"))
-    built = assembly(
-        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
-    )
+    built = flying(source.replace("np.concatenate([error, size[None]])", "error"), tmp_path)
     called, python = flown(built), flown(built, compiled=False)
     assert "has the shape (1, 1) after (1, 3): shapes must not change" in called.trouble
     assert_same(called, python)
@@ -547,10 +530,7 @@ class Law:
 def test_a_command_that_is_no_numbers_any_more_ends_the_flight_as_in_python(
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "own.py").write_text(BATCHED)
-    built = assembly(
-        "contraction-ideal", "duration=0.1", "law={kind='own.py:Law'}", folder=tmp_path
-    )
+    built = flying(BATCHED, tmp_path)
     compiled, python = flown(built), flown(built, compiled=False)
     assert "actuators compiled" in compiled.compiled
     assert "the law's command: torque is not numbers" in python.trouble
@@ -679,9 +659,7 @@ class Law:
 
 
 def test_a_state_that_is_turned_about_is_another(tmp_path: Path) -> None:
-    (tmp_path / "own.py").write_text(TURNING)
-    law = ["duration=0.1", "law={kind='own.py:Law'}"]
-    built = assembly("contraction-ideal", *law, folder=tmp_path)
+    built = flying(TURNING, tmp_path)
     compiled = flown(built)
     assert compiled.compiled == WHOLE
     assert_same(compiled, flown(built, compiled=False))

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import oracle
 import pytest
+from blocks import blocks_of
 
 from mjspace.attitude import rotation_angle
 from mjspace.contract import Measurement, Reference
@@ -351,15 +352,12 @@ BETWEEN = ("rates.control=0.01", "plant.parts.east.deployment.at=0.1034", "durat
         ("yo-yo-despin", BETWEEN),
     ],
 )
-def test_rows_and_events_do_not_depend_on_the_blocks(
-    name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_SECONDS", np.inf)
+def test_rows_and_events_do_not_depend_on_the_blocks(name: str, overrides: tuple[str, ...]) -> None:
     built = assembly(name, *overrides)
     found = {}
     for periods in (500, 7, 1):
-        monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", periods)
-        blocks = flown(built)
+        with blocks_of(periods):
+            blocks = flown(built)
         assert max(len(block.time) for block in blocks) <= periods
         whole = {
             (topic, field): rows(blocks, topic, field).tobytes()

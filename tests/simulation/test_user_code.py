@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from blocks import blocks_of
 
 from mjspace.contract import Reference
 from mjspace.errors import FlightError, InputError
@@ -176,10 +177,7 @@ def push(time, truth):
         flown(tmp_path, code, *orbit)
 
 
-def test_a_reference_cannot_change_what_it_has_returned(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("mjspace.simulation.loop.BLOCK_PERIODS", 10)  # it is asked in each block
+def test_a_reference_cannot_change_what_it_has_returned(tmp_path: Path) -> None:
     code = (
         law(GOOD)
         + """
@@ -192,9 +190,10 @@ class Source:
         return Reference(np.tile([1.0, 0, 0, 0], (n, 1)), self.rows[:n], np.zeros((n, 3)))
 """
     )
-    with pytest.raises(
+    refused = pytest.raises(
         FlightError, match=r"the reference raised ValueError at own\.py:\d+: .*read-only"
-    ):
+    )
+    with blocks_of(10), refused:  # it is asked in each block
         flown(tmp_path, code, "duration=10")
 
 

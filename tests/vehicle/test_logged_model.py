@@ -11,8 +11,9 @@ import pytest
 
 from mjspace.errors import InputError
 from mjspace.scenario.plant import PlantTable, Rates
+from mjspace.vehicle.composition import ASSETS
 from mjspace.vehicle.logged_model import OtherModelWarning, logged_model
-from mjspace.vehicle.vehicle import build, from_mjb, packed, to_mjb
+from mjspace.vehicle.vehicle import build, from_mjb, packed, saved, to_mjb
 
 
 @pytest.fixture(scope="module")
@@ -43,12 +44,19 @@ def test_every_bit_of_its_numbers_is_kept(here: Any) -> None:
 
 
 def test_a_model_that_was_compiled_elsewhere_is_the_same(here: Any) -> None:
-    """The paths of its files are in it, and how long they are together."""
-    own, start = to_mjb(here), to_mjb(here).rfind(here.paths)
-    longer = own[:start] + b"/a" + own[start:]
+    """How long the paths of its files are together is in it, and in older logs the paths."""
+    own, (mjb, paths) = to_mjb(here), saved(here)
+    longer = mjb[: paths.start] + b"/a" + mjb[paths.start :]
     at = own.index(here.npaths.to_bytes(8, "little"))
     longer = longer[:at] + (here.npaths + 2).to_bytes(8, "little") + longer[at + 8 :]
     assert to_mjb(taken(here, longer)) == own
+
+
+def test_a_log_does_not_tell_where_its_files_were(here: Any) -> None:
+    folder = str(ASSETS).encode()
+    assert folder in here.paths
+    assert folder not in to_mjb(here)
+    assert from_mjb(to_mjb(here)).paths == bytes(here.npaths)
 
 
 @pytest.mark.parametrize(

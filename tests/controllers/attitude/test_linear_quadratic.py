@@ -22,7 +22,7 @@ from mjspace.controllers.attitude.linear_quadratic import (
 from mjspace.controllers.references.references import Hold, Regulation
 from oracle import fly, wheel_speeds
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_continuous_are
 
 from mjspace import attitude as att
 from mjspace.contract import Array, Measurement, Reference
@@ -108,10 +108,65 @@ def test_linearization_is_that_of_the_equations_of_motion() -> None:
         np.testing.assert_allclose((ahead - behind) / (2.0 * h), A[:, i], atol=1e-9)
 
 
+def integrated(inertia: Array, motion: Regulation, time: Array, *, rtol: float) -> Array:
+    """Return P (n, 6, 6) at each ``time`` (n,), by DOP853 from the steady cost at the last."""
+    final = steady_cost(inertia, WEIGHTS)
+    _, B = linearized(inertia, np.zeros(3))
+
+    def slope(t: float, flat: Array) -> Array:
+        A, _ = linearized(inertia, motion.at(np.array([t])).rate[0])
+        P = flat.reshape(6, 6)
+        return -(P @ A + A.T @ P - P @ B @ B.T @ P + WEIGHTS.Q).ravel()
+
+    span, atol = (time[-1], time[0]), 0.1 * rtol * np.abs(final).max()
+    found = solve_ivp(slope, span, final.ravel(), "DOP853", time[::-1], rtol=rtol, atol=atol)
+    return found.y.T[::-1].reshape(-1, 6, 6)
+
+
+def test_a_heavy_bus_has_the_gains_of_the_equation() -> None:
+    """Absolute tolerances of a stepwise integration would be below rounding there."""
+    heavy = 1e6 * FULL
+    time = np.linspace(0.0, 60.0, 601)
+    P = cost_to_go(heavy, WEIGHTS, SLEW, steady_cost(heavy, WEIGHTS), time)
+    expected = integrated(heavy, SLEW, time[::100], rtol=1e-10)
+    scale = np.abs(expected).max(axis=0)
+    assert (np.abs(P[::100] - expected) / scale).max() < 1e-8  # 5e-10 measured
+    assert (np.abs(expected[0] - expected[-1]) / scale).max() > 0.1  # they do change
+
+
+def test_a_light_bus_has_the_steady_gains_of_each_instant() -> None:
+    """Its poles, of up to 6e4 rad/s, do not limit the step."""
+    light = 1e-5 * FULL
+    time = np.linspace(0.0, 60.0, 601)
+    P = cost_to_go(light, WEIGHTS, SLEW, steady_cost(light, WEIGHTS), time)
+    _, B = linearized(light, np.zeros(3))
+    for i in (0, 150, 300, 500):
+        A, _ = linearized(light, SLEW.at(time[i : i + 1]).rate[0])
+        steady = solve_continuous_are(A, B, *WEIGHTS)
+        assert np.abs(P[i] - steady).max() < 1e-8 * np.abs(steady).max()  # 3e-10 measured
+
+
+@pytest.mark.parametrize("steps", [10, 20])
+def test_the_riccati_equation_is_integrated_at_fourth_order(steps: int) -> None:
+    turn = Regulation(2.0, 10.0, np.array([1.0, -2.0, 1.5]))
+    final = steady_cost(FULL, WEIGHTS)
+    expected, far, near = (
+        cost_to_go(FULL, WEIGHTS, turn, final, np.linspace(0.0, 10.0, n + 1))[0]
+        for n in (640, steps, 2 * steps)
+    )
+    order = np.log2(np.abs(far - expected).max() / np.abs(near - expected).max())
+    assert order == pytest.approx(4.0, abs=0.5)
+
+
+def test_a_long_turn_has_no_longer_table() -> None:
+    law = Tracker(I, AXES, JW, duration=1e9)
+    np.testing.assert_allclose(law.gain_at(5e8), regulator().gain_at(0.0), atol=1e-7)
+
+
 def test_interpolated_gains_are_those_of_the_equation() -> None:
     law = tracker()
     time = np.array([0.0, 7.3456, 29.95, 47.13, 59.97, 60.0])
-    P = cost_to_go(I, WEIGHTS, SLEW, steady_cost(I, WEIGHTS), time)
+    P = integrated(I, SLEW, time, rtol=1e-11)
     wanted = feedback(I, WEIGHTS, P)
     found = np.array([law.gain_at(t) for t in time])
     assert np.abs(found - wanted).max() < 2e-8  # of 6; 2.1e-9 measured

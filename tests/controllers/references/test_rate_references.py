@@ -94,6 +94,15 @@ def test_an_attitude_does_not_depend_on_what_was_asked_before() -> None:
         assert all(np.array_equal(a[0], b[i]) for a, b in zip(alone, together, strict=True))
 
 
+def test_turns_are_compiled_to_the_bits_of_the_algebra() -> None:
+    turns = att.normalize(np.random.default_rng(3).normal(size=(100, 4)))
+    found = rate_references._turned.ufunc(turns[0], turns)
+    attitude = turns[0]
+    for turn, row in zip(turns, found, strict=True):
+        attitude = att.normalize(att.multiply(attitude, turn))
+        np.testing.assert_array_equal(row, attitude)
+
+
 def test_no_motion_is_a_held_attitude() -> None:
     still = Sinusoids(np.zeros(3), np.zeros(3), np.zeros(3)).at(np.array([0.0, 1.0, 1e6]))
     start = att.from_mrp(np.array([0.1707, 0.1205, 0.0621]))
