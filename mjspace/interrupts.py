@@ -98,9 +98,9 @@ class Stop:
             return again
 
         while frame is not None and not frame.f_code.co_filename.startswith(_TESTBED):
+            sys.settrace(lambda *_: None)  # without one, a frame's own is not called
             frame.f_trace = again
             frame = frame.f_back
-        sys.settrace(lambda *_: None)  # without one, frames' own are not called
 
 
 @contextmanager

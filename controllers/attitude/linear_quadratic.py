@@ -25,7 +25,7 @@ from .gain_table import GainTable
 from .wheel_momentum import wheel_momentum
 
 _TABLE_STEP = 0.1  # [s] between tabulated gains; 2e-9 of the largest, interpolated
-_MOST_STEPS = 6_000  # in a table, of 2 s: those of a longer turn are longer, its gains as slow
+_MOST_STEPS = 6_000  # of a table, 2 s to compute; longer ones in a turn that takes more than 10 min
 
 
 class State(NamedTuple):

@@ -27,9 +27,8 @@ def backwards(early: Array, late: Array, S: Array, Q: Array, final: Array, time:
     of the commutator-free Magnus method of fourth order (Blanes and Moan 2006, Applied Numerical
     Mathematics 56, CF4: two exponentials); it is exact where A is constant.
     """
-    scale = np.sqrt(np.linalg.norm(Q) / np.linalg.norm(S))  # of P, so that both blocks are alike
-    extrapolated = np.sqrt(4.0 / 3.0)  # by as much each half's A lies beyond the mean of both
-    mean, change = 0.5 * (early + late), 0.5 * extrapolated * (late - early)
+    scale = np.sqrt(np.linalg.norm(Q) / np.linalg.norm(S))  # of P: S and Q are then of one size
+    mean, change = 0.5 * (early + late), (late - early) / np.sqrt(3.0)
     halves = [
         _steps(A, scale * S, Q / scale, 0.5 * np.diff(time)) for A in (mean - change, mean + change)
     ]

@@ -1,6 +1,7 @@
 """What can be saved of a damaged log: every whole chunk, and what explains it, in a new file."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -75,6 +76,10 @@ def recover(path: Path, out: Path) -> Recovered:
         raise InputError(f"{out} exists: name a file that does not")
     with input_error_at("log"):
         found = salvage(path)
+    lost_topics = _unreadable_topics(path, found)
+    found = found._replace(
+        channels={t: c for t, c in found.channels.items() if t not in lost_topics}
+    )
     topics: dict[str, tuple[Shapes, dict[str, str], int]] = {}
     for topic in PERIODIC:
         if topic in found.channels:
@@ -86,10 +91,6 @@ def recover(path: Path, out: Path) -> Recovered:
     dtypes = {found.channels[t].id: doubles(s).record(0).dtype for t, (s, *_) in topics.items()}
     every = {found.channels[topic].id: every for topic, (*_, every) in topics.items()}
     most_often = min(every, key=every.__getitem__, default=-1)
-    lost_topics = []
-    if not _readable_events(path, found):
-        lost_topics = [_EVENTS]
-        found = found._replace(channels={t: c for t, c in found.channels.items() if t != _EVENTS})
     kept, lost_bytes = _in_order(path, found, dtypes, most_often)
     if not any(one.ends for one in kept):
         raise InputError(f"{path}: nothing of a flight can be saved: it has no whole chunk")
@@ -109,6 +110,15 @@ def recover(path: Path, out: Path) -> Recovered:
     return result
 
 
+def _unreadable_topics(path: Path, found: Salvage) -> list[str]:
+    """Return the topics that are declared on one channel, and /events if an entry is none."""
+    shared = Counter(channel.id for channel in found.channels.values())
+    unreadable = [topic for topic, channel in found.channels.items() if shared[channel.id] > 1]
+    if _EVENTS not in unreadable and not _readable_events(path, found):
+        unreadable.append(_EVENTS)
+    return unreadable
+
+
 def _readable_events(path: Path, found: Salvage) -> bool:
     """Tell whether all entries of /events are that: another topic's channel may have its name."""
     if _EVENTS not in found.channels:
@@ -119,8 +129,9 @@ def _readable_events(path: Path, found: Salvage) -> bool:
             data = unpacked(file, place)
             content = Content(data, message_offsets(data, [channel]))
             try:
-                for record in content.records(channel):
-                    event(record)
+                for one in content.channels:  # none, in a chunk without events
+                    for record in content.records(one):
+                        event(record)
             except ValueError:
                 return False
     return True

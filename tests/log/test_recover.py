@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from log_samples import ATTACHMENTS, BLOCKS, METADATA, fly, rewritten, rows
+from log_samples import ATTACHMENTS, BLOCKS, METADATA, create, fly, rewritten, rows, write_block
 from mcap.reader import make_reader
 
 from mjspace.errors import InputError
@@ -112,6 +112,26 @@ def test_an_attachment_that_is_damaged_is_named(whole: Path) -> None:
     assert found.lost_attachments == ["scenario.toml"]
     assert found.attachments == ["empty"]
     assert log.attachments == ("empty",)
+
+
+def test_topics_on_one_channel_are_left_out(whole: Path) -> None:
+    content = bytearray(whole.read_bytes())
+    truth, state = (content.index(b"\6\0\0\0" + topic) - 4 for topic in (b"/truth", b"/state"))
+    content[truth : truth + 2] = content[state : state + 2]  # in the records before the chunks
+    found, log = saved(whole, bytes(content))
+    assert found.lost_topics == ["/state", "/truth"]
+    assert "/state" not in log.topics
+    assert_rows(log, np.arange(sum(BLOCKS)))
+
+
+def test_a_chunk_without_events_costs_none(whole: Path) -> None:
+    path = whole.with_name("quiet.mcap")
+    with create(path) as quiet:
+        write_block(quiet, 0, 20)
+        quiet.write(*rows(20, 20))
+    found, log = saved(whole, path.read_bytes())
+    assert (found.lost, found.chunks) == ("", 2)
+    assert [event.message for event in log.events()] == ["period 10"]
 
 
 def test_events_that_cannot_be_read_are_left_out(whole: Path) -> None:
