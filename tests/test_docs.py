@@ -108,12 +108,12 @@ def test_everything_on_the_page_works(
         elif language == "python":
             do([sys.executable, "-c", text])
         elif language == "console":
-            for line in text.splitlines():
-                if line.startswith("$ cc ") and shutil.which("cc") is None:
-                    pytest.skip("the page compiles C, and there is no compiler")
+            for line in filter(lambda line: line.startswith("$ "), text.splitlines()):
                 words = shlex.split(line.removeprefix("$ "), comments=True)
-                own = words[:1] == ["python"] and (tmp_path / words[1]).exists()
-                if line.startswith("$ ") and (own or words[0] in ("mjspace", "cc")):
+                if words[0] == "cc" and shutil.which("cc") is None:
+                    pytest.skip("the page compiles C, and there is no compiler")
+                of_page = words[0] == "python" and (tmp_path / words[1]).exists()
+                if words[0] in ("mjspace", "cc") or of_page:
                     start(words[:-1]) if words[-1] == "&" else do(words)
 
 
