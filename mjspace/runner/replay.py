@@ -3,8 +3,7 @@
 import dataclasses
 import math
 import tomllib
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,32 +13,22 @@ import numpy as np
 from mjspace.contract import REPORTED_BY_PLANT, TICK, Array
 from mjspace.errors import InputError, failure, input_error_at
 from mjspace.interrupts import Interrupted, on_signals
-from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.log.rows import due
 from mjspace.log.writer import nanoseconds
-from mjspace.runner import scratch
 from mjspace.runner.former_names import as_logged, logged_name
-from mjspace.runner.logged_code import (
-    code_of,
-    model_files,
-    refuse_connection,
-    require_trust,
-    unpack,
-)
+from mjspace.runner.logged_assembly import assembly_of
 from mjspace.runner.output import LOG, refuse_existing
 from mjspace.runner.run import Progress, Result, fly_to_log
 from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.trust import is_address
-from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.flight_software.socket_law import ROUND_TRIP
 from mjspace.simulation.initial_state import Start, first_start, start_at, state_of_log
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block, Rows, one_vehicle, shapes
 from mjspace.simulation.user_code import reference_at
-from mjspace.vehicle import vehicle
-from mjspace.vehicle.logged_model import logged_model
 
 
 @dataclass(frozen=True)
@@ -176,55 +165,6 @@ def _other_streams(log: Log, scenario: Scenario) -> str:
         f"verify it with version {log.metadata.get('mjspace', '')}, revision "
         f"{log.metadata.get('git') or 'unknown'}"
     )
-
-
-@contextmanager
-def assembly_of(
-    log: Log, law: Component | None = None, folder: Path = Path(), *, trust: bool = False
-) -> Iterator[Assembly]:
-    """Yield the assembly that flew in ``log``, or the same under another ``law``.
-
-    The scenario, the compiled model and the user's files all come from the log. They run with
-    ``trust`` alone.
-
-    Raises:
-        InputError: the log lacks one of them, or they are not trusted; the law cannot be built, or
-            another version packed the environment into the state differently.
-    """
-    with input_error_at("log"):
-        scenario = scenario_of(log)
-    if law is not None:
-        scenario = _without_signals_of_the_law(scenario).model_copy(update={"law": law})
-    with input_error_at("log"):
-        code = code_of(log, scenario, law=law is None)
-        model = model_files(log, scenario)
-    if not trust:
-        require_trust(code)
-        if law is None:
-            refuse_connection(scenario)
-    with scratch.folder() as own:
-        unpack(code | model, own)
-        law_folder = None if law is None else folder
-        assembly = assemble(scenario, own, trust=trust, law_folder=law_folder)
-        flown = logged_model(
-            assembly.vehicle.model,
-            log.attachment("model.mjb.gz"),
-            log.metadata,
-            log.shape("/state", "physics"),
-        )
-        yield dataclasses.replace(assembly, vehicle=vehicle.on_model(assembly.vehicle, flown))
-
-
-def _without_signals_of_the_law(scenario: Scenario) -> Scenario:
-    """Return the scenario without checks and events of signals that another law may lack."""
-
-    def is_free(*signals: str) -> bool:
-        return not any(signal.startswith("law.") for signal in signals)
-
-    events = [event for event in scenario.events if is_free(event.signal, *event.shows)]
-    kept = {None, *(event.name for event in events)}
-    checks = [c for c in scenario.checks if is_free(c.signal) and {c.since, c.until} <= kept]
-    return scenario.model_copy(update={"events": events, "checks": checks})
 
 
 def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = False) -> Start:

@@ -11,7 +11,8 @@ from mjspace.environment.magnetic_field import FIELD, MOMENT
 from mjspace.errors import InputError
 from mjspace.log.encoding import doubles
 from mjspace.log.reader import Log
-from mjspace.runner.replay import assembly_of, replay, start_of, verify
+from mjspace.runner.logged_assembly import assembly_of
+from mjspace.runner.replay import replay, start_of, verify
 from mjspace.runner.run import run
 
 

@@ -21,8 +21,8 @@ from mjspace.log import topics
 from mjspace.log.chunk import encode
 from mjspace.log.reader import Log
 from mjspace.runner import flight_log
+from mjspace.runner.logged_assembly import assembly_of
 from mjspace.runner.recorder import AHEAD
-from mjspace.runner.replay import assembly_of
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
 from mjspace.simulation import loop

@@ -18,10 +18,10 @@ from mjspace.log.encoding import doubles
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.runner.former_names import FORMER, as_logged
+from mjspace.runner.logged_assembly import assembly_of
 from mjspace.runner.replay import (
     Difference,
     _other_streams,
-    assembly_of,
     first_difference,
     replay,
     start_of,
@@ -133,7 +133,7 @@ def test_a_difference_is_named(
     noisy: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A law that computes a last bit differently from 0.3 s on."""
-    from mjspace.runner import replay as module
+    from mjspace.runner import logged_assembly as module
 
     def altered(*arguments: Any, **options: Any) -> Any:
         built = assemble(*arguments, **options)
@@ -258,7 +258,7 @@ def test_progress_is_told_to_the_end_of_the_log_and_no_further(
     noisy: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the flight was interrupted: it is not flown on to the end of its scenario."""
-    from mjspace.runner import replay as module
+    from mjspace.runner import logged_assembly as module
 
     longer = scenario_of(noisy.log).model_copy(update={"duration": 0.8})
     for flown in (scenario_of(noisy.log), longer):
@@ -365,7 +365,7 @@ def test_a_log_that_ends_with_a_block_is_verified_to_its_end(
     noisy: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As if it had been interrupted there: the flight goes on to a block that the log lacks."""
-    from mjspace.runner import replay as module
+    from mjspace.runner import logged_assembly as module
 
     longer = scenario_of(noisy.log).model_copy(update={"duration": 0.8})
     monkeypatch.setattr(module, "scenario_of", lambda _: longer)

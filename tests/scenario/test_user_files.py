@@ -9,7 +9,8 @@ from mcap.reader import make_reader
 
 from mjspace.contract import Measurement
 from mjspace.log.reader import Log
-from mjspace.runner.replay import assembly_of, replay, start_of, verify
+from mjspace.runner.logged_assembly import assembly_of
+from mjspace.runner.replay import replay, start_of, verify
 from mjspace.runner.run import run
 from mjspace.scenario.trust import Trust
 from mjspace.scenario.user_files import beside, load_file
