@@ -37,7 +37,7 @@ class _Reference(NamedTuple):
     folder: str
     """Of the model that the file's own references are of."""
     owner: str
-    """The file that names it."""
+    """The file that names it; "" for the model itself."""
     only_drawn: bool = False
     """Whether MuJoCo can do without it: it leaves out what a URDF has for pictures alone."""
 
@@ -74,7 +74,7 @@ def source_of(name: str, read: Callable[[str], bytes | None]) -> ModelSource:
     """
     main = PurePosixPath(name).name
     files: dict[str, bytes] = {}
-    queue = [_Reference((main,), "", name)]
+    queue = [_Reference((main,), "", "")]
     while queue:
         reference = queue.pop()
         found = ((place, read(place)) for place in reference.places)
@@ -82,7 +82,8 @@ def source_of(name: str, read: Callable[[str], bytes | None]) -> ModelSource:
         if content is None and reference.only_drawn:
             continue
         if content is None:
-            raise ValueError(f"no file {reference.places[0]!r} (named in {reference.owner})")
+            owner = f" (named in {reference.owner})" if reference.owner else ""
+            raise ValueError(f"no file {reference.places[0]!r}{owner}")
         if _kept(place) not in files:
             files[_kept(place)] = content
             if PurePosixPath(place).suffix in KINDS:

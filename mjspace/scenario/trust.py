@@ -6,6 +6,7 @@ import inspect
 import pkgutil
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from ipaddress import ip_address
 from pathlib import Path
 from types import ModuleType
@@ -16,6 +17,7 @@ from mjspace.scenario.user_files import load_file
 
 GROUP = "mjspace.controllers"
 """The package of the laws that come with mjspace, and the entry points of those that do not."""
+_SCENARIOS = Path(str(files("mjspace.scenarios")))
 
 
 def is_library(kind: str) -> bool:
@@ -59,12 +61,14 @@ class Trust:
     """Whether any installed module and any file may be named."""
 
     def file(self, name: str) -> Path:
-        """Return the file of that name, looked up from the folder.
+        """Return the file of that name, looked up from the folder; or else of mjspace's scenarios.
 
         Raises:
             ValueError: it is outside the folder, and the scenario is not trusted.
         """
         path = self.folder / name
+        if Path(name).name == name and not path.exists() and (_SCENARIOS / name).is_file():
+            return _SCENARIOS / name  # as where a scenario is based on one of them
         if not (self._trusts(name) or path.resolve().is_relative_to(self.folder.resolve())):
             raise ValueError(f"{name} is outside the scenario's folder: --trust allows that")
         return path

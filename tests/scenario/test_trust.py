@@ -12,7 +12,7 @@ import mjspace
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load
 from mjspace.scenario.trust import Trust
-from mjspace.simulation.assembly import METHODS
+from mjspace.simulation.assembly import METHODS, assemble
 
 TOUCHES = "from pathlib import Path\nPath({!r}).touch()\n"
 LAW = """
@@ -153,3 +153,12 @@ def test_python_m_imports_nothing_from_the_current_folder(tmp_path: Path, module
     assert done.returncode == 0, done.stderr
     assert "contraction-ideal" in done.stdout
     assert not (tmp_path / "ran").exists()
+
+
+def test_a_file_of_mjspaces_own_scenarios_is_found_from_anywhere(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('base = "cubesat-6u"\ndescription = "mine"\n')
+    assert assemble(*load(path)).vehicle.model.body("structure").mass[0] == pytest.approx(9.6)
+    (tmp_path / "cubesat_6u.xml").write_text("<mujoco/>")  # one's own comes first
+    with pytest.raises(InputError, match=r"plant\.model: no free joint"):
+        assemble(*load(path))

@@ -93,7 +93,7 @@ def test_threads_change_neither(eventful: Assembly, whole: Flown) -> None:
 
 DIGESTS = """
 import sys
-sys.path.insert(0, {folder!r})
+sys.path[:0] = {folders!r}
 from test_blocks import digest
 for name in {names!r}:
     print(name, digest(name))
@@ -114,7 +114,8 @@ def digests(names: list[str], threads: int | None) -> list[str]:
     alone = {key: value for key, value in os.environ.items() if key not in LIBRARIES}
     if threads is not None:
         alone |= dict.fromkeys(LIBRARIES, str(threads))
-    code = DIGESTS.format(folder=str(Path(__file__).parent), names=names)
+    here = Path(__file__).parent
+    code = DIGESTS.format(folders=[str(here), str(here.parent)], names=names)
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code],
         env=alone, check=True, capture_output=True, text=True,
