@@ -6,6 +6,8 @@ call BLAS, whose rounding depends on the processor and on the number of vehicles
 
 from typing import Any
 
+import numpy as np
+
 from mjspace.contract import Array
 from mjspace.gufunc import gufunc
 
@@ -19,6 +21,11 @@ def cross(a: Array, b: Array) -> Array:
     """Return a x b, shape (..., 3)."""
     product: Array = _cross.ufunc(a, b)
     return product
+
+
+def cross_matrix(a: Array) -> Array:
+    """Return the matrix S(a) of a x b = S(a) b, shape (..., 3, 3)."""
+    return cross(np.eye(3), a[..., None, :])
 
 
 def dot(a: Array, b: Array) -> Array:

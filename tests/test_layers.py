@@ -44,8 +44,8 @@ ROOMS = {
     "plotting": "contract errors log scenario signals units",
     "rendering": "attitude contract environment errors log scenario vehicle",
     "simulation": (
-        "actuators attitude contract environment errors interrupts log ranges scenario sensors "
-        "signals tracing units vehicle"
+        "actuators algebra attitude contract environment errors interrupts log ranges scenario "
+        "sensors signals tracing units vehicle"
     ),
     "runner": "contract errors interrupts log scenario signals simulation units vehicle",
     "dm_env": "attitude contract environment errors scenario simulation",

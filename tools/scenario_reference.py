@@ -40,7 +40,8 @@ differs. Tables merge key by key; numbers and lists, `[[checks]]` among them, re
 does under `--set law.kind=...`, in whatever order the overrides stand. A base may have a base;
 `--set` comes last. A `duration` that is set on the command line leaves out the checks that begin
 after the flight's end, with a warning. Files that a base names are looked up from this file's
-folder. What is logged is the whole, without `base`.
+folder, and those of mjspace's own scenarios beside them. What is logged is the whole, without
+`base`.
 """
 
 

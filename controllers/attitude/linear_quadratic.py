@@ -15,7 +15,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-from mjspace.algebra import cross, times
+from mjspace.algebra import cross, cross_matrix, times
 from mjspace.attitude import conjugate, multiply
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
@@ -81,9 +81,9 @@ def linearized(inertia: Array, rate: Array) -> tuple[Array, Array]:
     """
     solve = np.linalg.inv(inertia)
     A, B = np.zeros((*rate.shape[:-1], 6, 6)), np.zeros((6, 3))
-    A[..., :3, :3] = solve @ (_skew(rate @ inertia) - _skew(rate) @ inertia)
+    A[..., :3, :3] = solve @ (cross_matrix(rate @ inertia) - cross_matrix(rate) @ inertia)
     A[..., 3:, :3] = np.eye(3)
-    A[..., 3:, 3:] = -_skew(rate)
+    A[..., 3:, 3:] = -cross_matrix(rate)
     B[:3] = solve
     return A, B
 
@@ -208,9 +208,3 @@ class PrintedTracker(Tracker):
     @staticmethod
     def _turning(rate: Array, delta: Array) -> Array:
         return delta
-
-
-def _skew(v: Array) -> Array:
-    """Return the matrix (..., 3, 3) of v x, of each v (..., 3)."""
-    matrix: Array = np.cross(np.eye(3), v[..., None, :])
-    return matrix

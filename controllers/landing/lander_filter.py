@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mjspace.algebra import cross, dot, matrix_product, times, transpose
+from mjspace.algebra import cross_matrix, dot, matrix_product, times, transpose
 from mjspace.attitude import from_rotation_vector, multiply, normalize, to_matrix
 from mjspace.contract import Array, Measurement, gain
 
@@ -108,7 +108,7 @@ class Navigation(LunarGravity):
         velocity_b = times(R_T, v)
         H = np.zeros_like(P[..., :3, :])
         # A rotation theta changes R^T v by velocity_b x theta.
-        H[..., VELOCITY], H[..., ATTITUDE] = R_T, _cross_matrix(velocity_b)
+        H[..., VELOCITY], H[..., ATTITUDE] = R_T, cross_matrix(velocity_b)
         changed = ground_velocity != estimate.last_aid[..., 1:]
         fresh = np.any(changed, axis=-1, keepdims=True)
         innovation = ground_velocity - velocity_b
@@ -135,9 +135,9 @@ class Navigation(LunarGravity):
 
         A = np.zeros_like(P)  # of the errors' equations, section 5.3.3
         A[..., POSITION, VELOCITY] = np.eye(3)
-        A[..., VELOCITY, ATTITUDE] = -matrix_product(R, _cross_matrix(f))
+        A[..., VELOCITY, ATTITUDE] = -matrix_product(R, cross_matrix(f))
         A[..., VELOCITY, FORCE_BIAS] = -R
-        A[..., ATTITUDE, ATTITUDE] = -_cross_matrix(w)
+        A[..., ATTITUDE, ATTITUDE] = -cross_matrix(w)
         A[..., ATTITUDE, GYRO_BIAS] = -np.eye(3)
         h = h[..., None]
         phi = np.eye(15) + h * A
@@ -179,8 +179,3 @@ def _corrected(
             P - K[..., :, None] * PH[..., None, :],
         )
     return x, P
-
-
-def _cross_matrix(a: Array) -> Array:
-    """Return the matrix S(a) of a x b = S(a) b, (..., 3, 3)."""
-    return cross(np.eye(3), a[..., None, :])

@@ -68,9 +68,11 @@ class ActuatorSet:
         side.
         """
         return [
-            [(batch.bind(kind.drives.array)[:, columns], part) for columns, part in runs]
+            [
+                (batch.bind(kind.drives.array)[:, columns], part)
+                for columns, part in kind.drives.runs(batch.model)
+            ]
             for kind in self.kinds
-            for runs in [kind.drives.runs(batch.model)]
         ]
 
     def reset(self, vehicles: int) -> State:

@@ -48,7 +48,7 @@ class Magnetorquers(ActuatorTable, Table):
     def actuator(self, context: Context) -> "CoilSet":
         """Return the coils."""
         axes = np.array(self.axes) / np.linalg.norm(self.axes, axis=1, keepdims=True)
-        return CoilSet(axes, of_each(self.dipole_limit or inf, len(axes)), self.time_constant)
+        return CoilSet(axes, self.dipole_limit or inf, self.time_constant)
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class CoilSet(Actuator):
 
     axes: Array
     """Unit axes in body axes, shape (n, 3)."""
-    dipole_limit: Array | float = inf
+    dipole_limit: Array | list[float] | float = inf
     """Largest moment of all or of each [A m^2], shape (n,)."""
     time_constant: float = 0.0
     """With which each follows its command [s]."""
@@ -71,10 +71,11 @@ class CoilSet(Actuator):
     drives: ClassVar[Input] = DIPOLE
     allocation: Array = field(init=False, repr=False)
     """Moments of the coils for each unit of the whole, shape (n, 3)."""
+    _limits: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "allocation", np.linalg.pinv(self.axes.T))
-        object.__setattr__(self, "dipole_limit", of_each(self.dipole_limit, len(self.axes)))
+        object.__setattr__(self, "_limits", of_each(self.dipole_limit, len(self.axes)))
 
     @property
     def stateful(self) -> bool:
@@ -87,7 +88,7 @@ class CoilSet(Actuator):
 
     def limits(self) -> dict[str, tuple[Array, Array]]:
         """Return the moment that the coils together have about each axis."""
-        largest = together(self.axes, of_each(self.dipole_limit, len(self.axes)))
+        largest = together(self.axes, self._limits)
         return {"dipole": (-largest, largest)}
 
     def act(
@@ -103,7 +104,7 @@ class CoilSet(Actuator):
         kept = exp(-step / self.time_constant) if self.stateful else 0.0
         mean = (1.0 - kept) * self.time_constant / step
         after, moment = _moments.ufunc(
-            command.dipole, before, self.allocation, self.axes, self.dipole_limit, [kept, mean]
+            command.dipole, before, self.allocation, self.axes, self._limits, [kept, mean]
         )
         return {"coil_moment": after} if self.stateful else {}, moment, np.zeros((len(moment), 0))
 

@@ -51,7 +51,7 @@ def _wheels(vehicle: Vehicle) -> ReactionWheels:
     count = len(vehicle.own.wheels)
     return ReactionWheels(
         vehicle.wheel_axes[:count],
-        np.array([min(-each.least, each.largest) for each in vehicle.own.wheels]),
+        np.array([each.either_way for each in vehicle.own.wheels]),
         inertia=stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[:count]],
         names=tuple(each.name for each in vehicle.own.wheels),
     )

@@ -112,7 +112,7 @@ class Wheels(ActuatorTable, Bearing):
         """
         vehicle = context.vehicle
         inertia = stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[: len(self.axes)]]
-        limits = of_each(self.torque_limit or inf, len(self.axes)), self.rotors.speed_limit
+        limits = self.torque_limit or inf, self.speed_limit or inf
         wheels = ReactionWheels(vehicle.wheel_axes, *limits, self.allocation, inertia)
         if context.alone:
             wheels.warn_of_unreachable("plant.wheels.axes")
@@ -185,9 +185,9 @@ class ReactionWheels(Actuator):
 
     axes: Array
     """Unit spin axes in body axes, shape (n, 3)."""
-    torque_limit: Array | float = inf
+    torque_limit: Array | list[float] | float = inf
     """Largest motor torque [N m], of all or of each, shape (n,)."""
-    speed_limit: Array | float = inf
+    speed_limit: Array | list[float] | float = inf
     """Largest speed relative to the bus [rad/s], of all or of each, shape (n,)."""
     shared_by: Literal["least_squares", "least_peak"] = "least_squares"
     """Of all motor torques that make the commanded one: those of least norm or of least peak."""

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from mjspace import attitude
+from mjspace.algebra import cross_matrix
 from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load
@@ -81,7 +82,7 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
     dynamics = slopes(accelerations)
     kinematics = np.hstack([np.zeros((model.nv, model.nv)), np.eye(model.nv)])
     rate = nominal[StateLayout(assembly).rate]
-    kinematics[3:6, 3:6] = -_cross(rate)  # after the position of the free joint
+    kinematics[3:6, 3:6] = -cross_matrix(rate)  # after the position of the free joint
     after = _after_a_period(assembly, physics, commands, interface.command)
     moves = slopes(np.array([_difference(model, after[0], row) for row in after]))
     measured = dict(_outputs(assembly, interface.measurement))
@@ -279,9 +280,3 @@ def _names(fields: Fields) -> Iterator[str]:
 def _units(fields: Fields) -> Iterator[str]:
     for field in fields.values():
         yield from [field.unit] * prod(field.shape)
-
-
-def _cross(vector: Array) -> Array:
-    """Return the matrix that multiplies by ``vector`` x, (3, 3)."""
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -20,6 +20,8 @@ from mjspace.validation import model_files
 from mjspace.validation.passport import Finding
 from mjspace.validation.results import Data
 from mjspace.vehicle import mass_properties, own_model, roles
+from mjspace.vehicle.indices import bus_id
+from mjspace.vehicle.model_sensors import sensors_of
 from mjspace.vehicle.roles import Motor
 from mjspace.vehicle.vehicle import Vehicle, build, inertials
 
@@ -154,7 +156,7 @@ def inspect(source: ModelSource, table: PlantTable) -> Inspection:
         model=source.name,
         step=_rates(model).physics,
         bodies=[_body(model, i) for i in range(1, model.nbody)],
-        sensors=[_sensor(model, i) for i in range(model.nsensor)],
+        sensors=[Sensor(name=s.name, kind=s.kind, size=s.size) for s in sensors_of(model)],
         cameras=[model.camera(i).name or f"camera {i}" for i in range(model.ncam)],
         vehicle=None if vehicle is None else _whole(vehicle),
         findings=findings,
@@ -204,29 +206,22 @@ def _replaced(model: Any) -> Iterator[str]:
 def _body(model: Any, body: int) -> Body:
     first, count = model.body_jntadr[body], model.body_jntnum[body]
     kinds = [
-        mujoco.mjtJoint(model.jnt_type[j]).name[6:].lower() for j in range(first, first + count)
+        mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower()
+        for j in range(first, first + count)
     ]
     names = [model.joint(j).name for j in range(first, first + count)]
     return Body(
         name=model.body(body).name,
         parent=model.body(model.body_parentid[body]).name,
-        joints=[f"{name} ({kind.lower()})" for name, kind in zip(names, kinds, strict=True)],
+        joints=[f"{name} ({kind})" for name, kind in zip(names, kinds, strict=True)],
         mass=float(model.body_mass[body]),
         principal_moments=model.body_inertia[body].tolist(),
     )
 
 
-def _sensor(model: Any, sensor: int) -> Sensor:
-    kind = mujoco.mjtSensor(model.sensor_type[sensor]).name.removeprefix("mjSENS_").lower()
-    name = model.sensor(sensor).name
-    return Sensor(name=name, kind=kind, size=int(model.sensor_dim[sensor]))
-
-
 def _whole(vehicle: Vehicle) -> Whole:
     own, model = vehicle.own, vehicle.model
-    bodies = list(inertials(model).values())
-    mass = sum(body.mass for body in bodies)
-    centre: Array = sum((body.mass * body.ipos for body in bodies), np.zeros(3)) / mass
+    mass, centre, inertia = mass_properties.together(inertials(model).values())
     places, ways = roles.places_and_directions(model, own.thrusters)
     takes = {
         name: Field(size=int(np.prod(shape)), unit=unit)
@@ -234,19 +229,19 @@ def _whole(vehicle: Vehicle) -> Whole:
         for name, (shape, unit) in kind.takes.items()
     }
     return Whole(
-        bus=model.body(model.jnt_bodyid[0]).name,
+        bus=model.body(bus_id(model)).name,
         mass=mass,
         center_of_mass=centre.tolist(),
-        inertia=mass_properties.together(bodies).tolist(),
+        inertia=inertia.tolist(),
         wheels=[
             Wheel(
                 motor=each.name,
                 hinge=each.drives,
                 axis=axis.tolist(),
-                inertia=float(inertia),
-                torque_limit=_finite(min(-each.least, each.largest)),
+                inertia=float(axial),
+                torque_limit=_finite(each.either_way),
             )
-            for each, axis, inertia in zip(
+            for each, axis, axial in zip(
                 own.wheels, vehicle.wheel_axes, vehicle.wheel_inertia, strict=True
             )
         ],

@@ -154,16 +154,16 @@ def remainder(whole: float, inertia: Array, others: Sequence[Inertial]) -> Inert
     return Inertial(left, centre, *principal(own))
 
 
-def together(bodies: Iterable[Inertial]) -> Array:
-    """Return the inertia matrix (3, 3) [kg m^2] of bodies about their common centre of mass.
+def together(bodies: Iterable[Inertial]) -> tuple[float, Array, Array]:
+    """Return mass [kg], centre of mass (3,) [m] and inertia matrix (3, 3) [kg m^2] of all bodies.
 
-    All are in the same axes, and so is the result.
+    The matrix is about their common centre. All are in the same axes, and so is the result.
     """
     bodies = list(bodies)
     mass = sum(body.mass for body in bodies)
     centre = sum((body.mass * body.ipos for body in bodies), np.zeros(3)) / mass
     parts = (tensor(b.inertia, b.iquat) + b.mass * _point(b.ipos - centre) for b in bodies)
-    return sum(parts, np.zeros((3, 3)))
+    return mass, centre, sum(parts, np.zeros((3, 3)))
 
 
 def tensor(inertia: Array, iquat: Array) -> Array:

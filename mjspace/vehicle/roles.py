@@ -12,6 +12,7 @@ from mjspace.contract import Array
 from mjspace.errors import nearest
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.plant import Roles
+from mjspace.vehicle.indices import bus_id
 from mjspace.vehicle.model_sensors import ModelSensor, sensors_of
 
 _ON_AXIS = 1e-3
@@ -31,6 +32,11 @@ class Motor:
     """Of its command; -inf without a limit."""
     largest: float
     """Of its command; inf without a limit."""
+
+    @property
+    def either_way(self) -> float:
+        """The largest command that it obeys in both directions; inf without a limit."""
+        return min(-self.least, self.largest)
 
 
 @dataclass(frozen=True)
@@ -107,7 +113,7 @@ def places_and_directions(model: Any, thrusters: Sequence[Motor]) -> tuple[Array
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    bus = model.jnt_bodyid[0]
+    bus = bus_id(model)
     axes, origin = data.xmat[bus].reshape(3, 3), data.xpos[bus]
     places, ways = [], []
     for each in thrusters:
@@ -124,14 +130,12 @@ def _check_bus(model: Any) -> None:
     names = [model.body(model.jnt_bodyid[joint]).name for joint in free]
     if len(free) == 1 and free[0] == 0:
         return
-    if len(free) == 1:
+    if len(names) == 1:
         first = model.joint(0).name
         problem = f"the joint {first!r} comes before {names[0]!r}, which is free: put it first"
-    elif len(free) > 1:
-        listed = ", ".join(map(repr, names))
-        problem = f"{len(free)} bodies have a free joint, {listed}: one vehicle flies alone"
     else:
-        problem = "no free joint: the vehicle hangs on the world"
+        listed = ", ".join(map(repr, names)) or "none"
+        problem = f"{len(free)} bodies have a free joint, {listed}: one vehicle flies alone"
     raise ValueError(f"plant.model: {problem}")
 
 
@@ -208,7 +212,7 @@ def _is_force_at_site(model: Any, motor: int) -> bool:
 def _is_wheel(model: Any, motor: int) -> bool:
     """Tell whether a torque motor turns a balanced body on the bus that may turn on and on."""
     joint = model.actuator_trnid[motor, 0]
-    body, bus = model.jnt_bodyid[joint], model.jnt_bodyid[0]
+    body, bus = model.jnt_bodyid[joint], bus_id(model)
     on_bus = model.body_weldid[model.body_parentid[body]] == model.body_weldid[bus]
     alone = model.body_dofnum[body] == 1 and not np.any(
         (model.body_parentid[1:] == body) & (model.body_dofnum[1:] > 0)

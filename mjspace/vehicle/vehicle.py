@@ -109,7 +109,7 @@ def build(
     if gyrostat is None:
         axes = indices.axes(model, where["wheel_dof"])
         inertia = indices.axial_inertia(model, where["wheel_dof"])
-        gyrostat = mass_properties.together(inertials(model).values())
+        _, _, gyrostat = mass_properties.together(inertials(model).values())
         gyrostat -= axes.T @ (inertia[:, None] * axes)
 
     return Vehicle(

@@ -1,17 +1,16 @@
 """Matrices of linearized vehicles against closed forms, and against the flight itself."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from command_lines import command_line
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import mjspace
-from mjspace import cli
 from mjspace.errors import InputError
 from mjspace.simulation.linear_plant import LinearPlant
 
@@ -231,14 +230,6 @@ def test_what_has_no_linear_model_is_refused(
     assert command_line("linearize", scenario, "--out", str(tmp_path / "plant.npz")) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not list(tmp_path.iterdir())
-
-
-def command_line(*words: str) -> int:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["mjspace", *words])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-    return int(ended.value.code or 0)
 
 
 def test_the_file_holds_it_all(rigid: Path, tmp_path: Path) -> None:

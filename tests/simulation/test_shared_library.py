@@ -2,14 +2,13 @@
 
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command_lines import command_line
 from pages import write_files
 
-from mjspace import cli
 from mjspace.errors import FlightError, InputError
 from mjspace.log.reader import Log
 from mjspace.runner.replay import replay, verify
@@ -55,14 +54,6 @@ class Law(Gains):
 """
 GAINS = ("attitude_gain='6 N m'", "rate_gain=12", "integral_gain=0.6")
 SHORT = ["duration=5", "checks=[]"]
-
-
-def command_line(*words: str) -> int:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["mjspace", *words])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-    return int(ended.value.code or 0)
 
 
 def compiled(folder: Path, source: str = "attitude_law.c", library: str = "") -> Path:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+from command_lines import command_line
 
-from mjspace import cli
 from mjspace.errors import FlightError, InputError
 from mjspace.log.reader import Log
 from mjspace.runner.replay import replay, verify
@@ -417,14 +417,6 @@ def test_nothing_is_sent_to_what_does_not_greet(folder: Path, tmp_path: Path) ->
         flight(bare(listens), folder, tmp_path / "none")
     assert ended.wait(10.0)
     assert heard == [b""]
-
-
-def command_line(*words: str) -> int:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["mjspace", *words])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-    return int(ended.value.code or 0)
 
 
 def free_port() -> int:
