@@ -214,6 +214,9 @@ def test_each_wheel_has_limits_of_its_own() -> None:
     # By its torque limit, by its speed limit, which is nearer, and likewise.
     np.testing.assert_allclose(ctrl, [-0.1, -0.1, 0.05], atol=1e-14)
     assert saturated.tolist() == [1.0, 1.0, 1.0]
+    ctrl, saturated = team.motor_torque(np.array([1.0, 1.0, -1.0]), np.zeros(3), 1.0)
+    np.testing.assert_allclose(ctrl, [-0.1, -0.2, 1.0], atol=1e-14)
+    assert saturated.tolist() == [1.0, 1.0, 0.0]
     ctrl, saturated = team.motor_torque(np.array([0.05, -0.15, 5.0]), np.zeros(3), 1.0)
     np.testing.assert_allclose(ctrl, [-0.05, 0.15, -5.0], atol=1e-15)
     assert not saturated.any()

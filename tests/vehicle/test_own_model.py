@@ -39,7 +39,9 @@ def test_a_jet_alone_changes_the_momentum(tmp_path: Path) -> None:
     path = write(tmp_path)
     law = tmp_path / "law.py"
     still = law.read_text().replace("(*rows, 1), 3.0)", "(*rows, 1), 0.0)")
-    pushed = run(path, out=tmp_path / "a").log.read("/truth")
+    log = run(path, out=tmp_path / "a").log
+    pushed = log.read("/truth")
+    assert log.read("/command", ["applied_force"])["applied_force"].max() == 2.0  # of 3 N
     law.write_text(still)
     held = run(path, out=tmp_path / "b").log.read("/truth", ["momentum"])["momentum"]
     assert np.abs(held - held[0]).max() < 1e-9 * np.abs(held).max()  # RK4, with a servo at 4 ms

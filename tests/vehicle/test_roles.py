@@ -36,8 +36,41 @@ def test_limits_are_of_torque_and_force() -> None:
     assert limits["m1"] == pytest.approx((-0.01, 0.01))
     assert limits["m2"] == pytest.approx((-0.02, 0.03))
     assert limits["rw3_motor"] == (-np.inf, np.inf)
+    assert [motor.either_way for motor in found.wheels] == pytest.approx([0.01, 0.02, np.inf])
     assert (found.thrusters[0].least, found.thrusters[0].largest) == (0.0, 2.0)
     assert (found.others[0].least, found.others[0].largest) == (-1.0, 1.0)
+
+
+def test_the_gain_of_a_motor_counts_as_its_gear_does() -> None:
+    text = SENSED.replace(
+        '<motor name="m2"', '<general gainprm="3" ctrlrange="-0.001 0.001" name="m2"'
+    )
+    spec = own_model.read(source(text))
+    found, _ = own_model.prepare(spec, Roles())
+    assert [(m.name, m.largest) for m in found.wheels[:2]] == [("m1", 0.01), ("m2", 0.003)]
+    motor = spec.actuator("m2")
+    assert (motor.gainprm[0], motor.gear[0]) == (1.0, 1.0)
+    np.testing.assert_allclose(motor.ctrlrange, [-0.003, 0.003])
+
+
+ROTOR = '<body name="r"><joint name="r" axis="0 0 1"/><geom type="cylinder" size=".03 .01"/></body>'
+
+
+@pytest.mark.parametrize(
+    ("place", "reason"),
+    [
+        ('<geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.01" mass="0.5"/>', "it is on an arm"),
+        ('<geom type="cylinder" size="0.03 0.01" mass="0.2"/>', "it is on a wheel, then a gimbal"),
+    ],
+)
+def test_what_does_not_turn_on_the_bus_alone_is_no_wheel(place: str, reason: str) -> None:
+    assert place in SENSED
+    text = SENSED.replace(place, place + ROTOR).replace(
+        "</actuator>", '<motor name="r" joint="r"/></actuator>'
+    )
+    wheels = names(recognized(text), "wheels")
+    assert "r" not in wheels, reason
+    assert ("rw3_motor" in wheels) is ("arm" in reason)
 
 
 @pytest.mark.parametrize(
