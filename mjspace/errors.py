@@ -152,8 +152,9 @@ def printable(text: str) -> str:
 def shortened(text: str, most: int = 200) -> str:
     """Return the text on one line, without the middle of what is longer than ``most``."""
     line = " ".join(printable(text).split())
-    half = most // 2 - 2
-    return line if len(line) <= most else f"{line[:half]} ... {line[-half:]}"
+    gap = " ... "
+    half = (most - len(gap)) // 2
+    return line if len(line) <= most else f"{line[:half]}{gap}{line[-half:]}"
 
 
 def is_file_name(text: str) -> bool:

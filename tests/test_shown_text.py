@@ -32,6 +32,12 @@ def test_what_is_shown_is_plain_short_and_can_be_written(text: str) -> None:
     printable(text).encode()
 
 
+@pytest.mark.parametrize("most", [50, 51, 200])
+def test_what_is_one_too_long_is_shortened_to_what_is_allowed(most: int) -> None:
+    assert shortened("0" * most, most) == "0" * most
+    assert most - 1 <= len(shortened("0" * (most + 1), most)) <= most
+
+
 def test_the_middle_of_a_long_text_is_left_out() -> None:
     text = shortened("begin " + "x" * 5000 + " end", 50)
     assert text.startswith("begin x")
