@@ -49,7 +49,8 @@ def cases(bases: dict[str, Path], seed: int | str) -> Iterator[Case]:
         base = random.choice(list(whole))
         mutate = random.choice(MUTATIONS)
         content = mutate(random, whole[base].copy())
-        poisoned = isinstance(content, Parts)
+        # A number may be replaced by what it was.
+        poisoned = isinstance(content, Parts) and content.chunks != whole[base].chunks
         if isinstance(content, Parts):
             content = parts.joined(content)
         yield Case(f"{number}-{base}-{mutate.__name__}", content, poisoned and mutate is state)
