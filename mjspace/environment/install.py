@@ -47,6 +47,16 @@ def userdata_size(environment: Environment, plant: PlantTable | None = None) -> 
     return HEADER + sum(2 + term.payload_size() for term in terms_of(environment, plant))
 
 
+def places_of(kind: type[Term], environment: Environment, plant: PlantTable) -> list[int]:
+    """Return where in ``userdata`` the parameters of each term of that ``kind`` begin."""
+    found, place = [], HEADER
+    for term in terms_of(environment, plant):
+        if isinstance(term, kind):
+            found.append(place + 2)
+        place += 2 + term.payload_size()
+    return found
+
+
 def userdata(model: Any, environment: Environment, plant: PlantTable | None = None) -> Array:
     """Return a vehicle's ``userdata``, shape (model.nuserdata,).
 

@@ -1,4 +1,4 @@
-"""The terms that there are: those of the scenario's environment, and those in the vehicle's hinges.
+"""The terms that there are: those of the scenario's environment, and those of the plant.
 
 A term of the environment is registered by its key in ``scenario.environment.Environment``.
 """
@@ -8,12 +8,17 @@ from collections.abc import Iterator
 from mjspace.environment.base import Term
 from mjspace.environment.bearing_friction import BearingFriction
 from mjspace.environment.compiled import compiled
+from mjspace.environment.connection import Latch
 from mjspace.environment.torque_ripple import TorqueRipple
 from mjspace.scenario.declared import tables_in, type_of
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.plant import PlantTable
 
-IN_HINGES: tuple[type[BearingFriction] | type[TorqueRipple], ...] = (BearingFriction, TorqueRipple)
+OF_PLANT: tuple[type[BearingFriction] | type[TorqueRipple] | type[Latch], ...] = (
+    BearingFriction,
+    TorqueRipple,
+    Latch,
+)
 
 
 def kernels() -> dict[int, compiled]:
@@ -38,10 +43,10 @@ def _kinds() -> Iterator[type[Term]]:
         for table in tables_in(type_of(field)):
             if issubclass(table, Term):
                 yield table
-    yield from IN_HINGES
+    yield from OF_PLANT
 
 
 def terms_of(environment: Environment, plant: PlantTable | None) -> list[Term]:
     """Return what acts on a vehicle, in the order of the blocks in ``userdata``."""
-    in_hinges = [] if plant is None else [term for kind in IN_HINGES for term in kind.of(plant)]
-    return [*environment.terms, *in_hinges]
+    of_plant = [] if plant is None else [term for kind in OF_PLANT for term in kind.of(plant)]
+    return [*environment.terms, *of_plant]

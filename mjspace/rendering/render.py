@@ -23,6 +23,7 @@ from mjspace.vehicle.logged_model import logged_model
 from mjspace.vehicle.vehicle import build
 
 _LARGEST = 8192  # pixels: 5 GB and 17 s for a still, drawn in software
+_FASTEST = 1000.0  # frames a second
 _MOST_FRAMES = 1_000_000
 
 
@@ -53,10 +54,12 @@ def render(
     log, output = Log.of(log), Path(output)
     if output.suffix not in (".mp4", ".png"):
         raise ValueError(f"output {str(output)!r}: end it in .mp4 for a video, .png for a still")
-    if not (min(size) >= 16 and max(size) <= _LARGEST and 0.0 < min(rate, speed) < np.inf):
+    if not (min(size) >= 16 and max(size) <= _LARGEST):
+        raise ValueError(f"size {size[0]}x{size[1]}: should be from 16x16 to {_LARGEST}x{_LARGEST}")
+    if not (1.0 / _FASTEST <= rate <= _FASTEST and 0.0 < speed < np.inf):
         raise ValueError(
-            f"size {size[0]}x{size[1]}, rate {rate:g}, speed {speed:g}: a size should be from "
-            f"16x16 to {_LARGEST}x{_LARGEST}, a rate and a speed positive"
+            f"rate {rate:g}, speed {speed:g}: a rate should be from {1.0 / _FASTEST:g} to "
+            f"{_FASTEST:g}, a speed positive"
         )
     if output.suffix == ".png":
         times: Array = np.array([_still_time(log, at)])
@@ -64,12 +67,13 @@ def render(
         with whole_or_none(output) as file:
             Image.fromarray(frame).save(file, format="png")
         return
-    period = speed / rate
-    if not (log.end - log.start) / period < _MOST_FRAMES:
+    frames = (log.end - log.start) * (rate / speed)
+    if not frames < _MOST_FRAMES:
         raise ValueError(
-            f"rate {rate:g}, speed {speed:g}: a video of {(log.end - log.start) / period:.3g} "
-            f"frames, should be at most {_MOST_FRAMES}"
+            f"rate {rate:g}, speed {speed:g}: a video of {frames:.3g} frames, should be at most "
+            f"{_MOST_FRAMES}"
         )
+    period = speed / rate
     count = int((log.end - log.start) / period + 1e-9) + 1
     times = np.linspace(log.start, log.start + period * (count - 1), count)
     with Video(output, size, rate) as video:

@@ -35,7 +35,7 @@ def units_of(assembly: Assembly, kinds: Mapping[str, type] = {}) -> dict[str, di
         if sensor.unit:
             units["/measurement"].setdefault(name, Unit(sensor.unit))
             units["/truth"].setdefault(sensor.measures, Unit(sensor.unit))
-    for own in assembly.vehicle.own.sensors:
+    for own in assembly.vehicle.sensors:
         if own.measured and own.unit:
             units["/measurement"][own.field] = units["/truth"][own.field] = Unit(own.unit)
     return units

@@ -27,6 +27,7 @@ from mjspace.scenario.fields import (
     Velocity3,
 )
 from mjspace.scenario.hinges import Hinge
+from mjspace.scenario.ports import Port
 from mjspace.units import whole_number
 
 
@@ -127,6 +128,21 @@ class PlantTable(Table):
     """Torque ripple of motors, by the hinge."""
     ground: Annotated[Any, DeclaredIn("mjspace.vehicle.ground:Ground")] = None
     """What is below it; nothing when left out."""
+    ports: dict[Name, Port] = {}
+    """Places on the vehicle at which other spacecraft are connected, by a name of one's own."""
+    spacecraft: dict[
+        Name,
+        Annotated[
+            Any,
+            DeclaredIn("mjspace.vehicle.other_spacecraft:OtherSpacecraft", optional=False),
+        ],
+    ] = {}
+    """Those that fly beside the vehicle, by a name of one's own: ``[plant.spacecraft.target]``."""
+    connections: dict[
+        Name,
+        Annotated[Any, DeclaredIn("mjspace.environment.connection:Connection", optional=False)],
+    ] = {}
+    """Of the vehicle and others, by a name of one's own: ``[plant.connections.dock]``."""
 
     # The actuators, in the order in which they act and are logged. A line registers each.
     drives: Annotated[Any, DeclaredIn("mjspace.actuators.motor_drives:DriveTables")] = None

@@ -23,7 +23,7 @@ from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import Surroundings
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
-from mjspace.vehicle import deployments, ground_contact, own_model
+from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
 from mjspace.vehicle.vehicle import Vehicle, build, initial_state
 
 if TYPE_CHECKING:
@@ -81,7 +81,10 @@ class Assembly:
         orbit = self.scenario.environment.orbit
         return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
-            own_sensors=tuple(s.field for s in self.vehicle.own.sensors if s.measured),
+            own_sensors=(
+                *(sensor.field for sensor in self.vehicle.sensors if sensor.measured),
+                *(f"{name}_closed" for name in self.scenario.plant.connections),
+            ),
             gravity=self._gravity,
             magnetic_field=None if self.field is None else self.field.at,
             orbit_position=None if orbit is None else partial(orbit_position, orbit),
@@ -172,6 +175,7 @@ def assemble(
         )
     qpos, qvel = _part("initial", initial_state, vehicle, scenario.initial)
     deployments.stow(vehicle.model, qpos, scenario.plant.parts)
+    _part("plant", other_spacecraft.set_states, vehicle.model, scenario.plant, qpos, qvel)
     if scenario.plant.ground is not None:
         _part("initial.position", ground_contact.refuse_buried, vehicle.model, qpos)
     assembly = Assembly(

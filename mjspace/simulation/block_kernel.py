@@ -189,10 +189,13 @@ def _look(orders: Any, words: Any, base: int, fields: Any) -> Any:
 
 @njit
 def _begin_period(
-    orders: Any, base: int, words: Any, model: int, data: int, fields: Any, record: int
+    orders: Any, base: int, words: Any, model: int, data: int, fields: Any, record: int, k: int
 ) -> Any:
-    """Fly a control instant, whose inputs are in the memory; return whether there is an event."""
-    if orders.looks:
+    """Fly the block's control instant ``k``, whose inputs are in the memory.
+
+    Return whether there is an event. At the first instant Python has looked.
+    """
+    if k and orders.looks:
         of_model_and_data(orders.step1, model, data)
         if _look(orders, words, base, fields):
             return True
@@ -287,6 +290,9 @@ def _fly(
     row = orders.row + vehicle * orders.row_stride
     derived = np.zeros(3, np.bool_)
     _copy(base, row, remembered)
+    if orders.begin and orders.masses[1]:  # what is seen depends on them, in the last digits
+        _write_masses(orders, of_model, base)
+        derived[0] = True
     for half in range(orders.begin, orders.end):
         k = half // 2
         number = orders.first + k
@@ -296,7 +302,7 @@ def _fly(
             with_state(orders.getState, model, data, base + orders.state_row, orders.state)
         if half % 2 == 0:
             _copy_inputs(base, inputs, k, vehicle)
-            told = _begin_period(orders, base, words, model, data, fields, record)
+            told = _begin_period(orders, base, words, model, data, fields, record, k)
         else:
             _copy_inputs(base, commands, k, vehicle)
             told = _fly_steps(

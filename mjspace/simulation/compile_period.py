@@ -251,7 +251,10 @@ class _Tracing(TracedArrays):
             written, masses, reports = list[Write](), list[Write](), []
             for effect, known in zip(self.effects, self.known, strict=True):
                 writes, report = effect.prepare(
-                    self.traced(self.physics), self.traced(self.time), self.traced(known)
+                    memory[1],
+                    self.traced(self.physics),
+                    self.traced(self.time),
+                    self.traced(known),
                 )
                 written += self._own_numbers(writes)
                 reports.append(report)

@@ -57,6 +57,7 @@ class CompiledFlight:
         self.physics = self._batch.state
         named = (period.memory, period.sensors, period.biases)
         remembered = [*(a for arrays in named for a in arrays.values()), *period.law]
+        remembered += [write.values for write in period.masses]
         places, size = _packed(remembered)
         self._rows = np.zeros((vehicles, size), np.uint8)
         views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
@@ -66,7 +67,8 @@ class CompiledFlight:
         )
         for name, bias in self._suite.biases.items():
             biases[name][...] = bias
-        self.law = type(period.law)(*one_by_one) if period.law else ()
+        law = [next(one_by_one) for _ in period.law]
+        self.law = type(period.law)(*law) if law else ()
         self._record_places, self._record_size = _packed(
             [*(each.array for each in (*period.before, *period.after)), period.saturated]
         )

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from mjspace.simulation.actuator_faults import ActuatorFaults
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.burning_mass import BurningMass
+from mjspace.simulation.connections import Connections
 from mjspace.simulation.magnetic_field import MagneticField
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_disturbance import UserDisturbance
@@ -20,7 +21,8 @@ def effects_of(
     scenario, model = assembly.scenario, assembly.vehicle.model
     every = (
         ground_contact.of(model, layout.struts, layout.velocity),
-        ModelSensors.of(model, assembly.vehicle.own.sensors),
+        ModelSensors.of(model, assembly.vehicle.sensors),
+        Connections.of(assembly),
         ActuatorFaults.of(assembly, members),
         BurningMass.of(assembly.actuators),
         MagneticField.of(assembly.field),

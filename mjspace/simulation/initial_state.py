@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.environment.connection import Latch
+from mjspace.environment.install import places_of
 from mjspace.environment.magnetic_field import FIELD, MOMENT
 from mjspace.errors import InputError
 from mjspace.scenario.scenario import Scenario
@@ -62,7 +64,8 @@ def state_of_log(assembly: Assembly, physics: Array) -> Array:
     """Return a logged integration state, (1, nstate), with the constants of the ``assembly`` in it.
 
     ``userdata`` tells the native callbacks which memory to read and write. Of a log, which may be a
-    stranger's, only what changes in flight is taken: the magnetic field and the moment.
+    stranger's, only what changes in flight is taken: the magnetic field, the moment, and the states
+    of connections.
 
     Raises:
         InputError: a number of it is not finite.
@@ -77,6 +80,8 @@ def state_of_log(assembly: Assembly, physics: Array) -> Array:
     if assembly.field is not None:
         for changes in (FIELD, MOMENT):
             constants[changes] = data.userdata[changes]
+    states = places_of(Latch, assembly.scenario.environment, assembly.scenario.plant)
+    constants[states] = data.userdata[states]
     data.userdata = constants
     row = np.empty_like(physics)
     mujoco.mj_getState(model, data, row[0], INTEGRATION)

@@ -43,7 +43,7 @@ class MagneticField(StepEffect):
         return self._field.piece(times)
 
     def prepare(
-        self, physics: Array, time: Array, known: Array
+        self, memory: State, physics: Array, time: Array, known: Array
     ) -> tuple[list[Write], Array | None]:
         """Return that the cubic is written."""
         return [Write("userdata", FIELD.start, known[None])], None

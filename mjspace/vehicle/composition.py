@@ -12,8 +12,15 @@ from mjspace.errors import input_error_at, nearest
 from mjspace.scenario.hinges import Hinge
 from mjspace.scenario.model_source import ModelSource
 from mjspace.scenario.plant import Part, PlantTable
-from mjspace.vehicle import deployments, mass_properties, own_model
+from mjspace.vehicle import (
+    deployments,
+    mass_properties,
+    other_spacecraft,
+    own_model,
+    relative_motion,
+)
 from mjspace.vehicle.indices import ENVIRONMENT, KINETIC, MOMENTUM
+from mjspace.vehicle.model_sensors import ModelSensor
 from mjspace.vehicle.roles import Recognized
 
 ASSETS = Path(str(files("mjspace.assets")))
@@ -38,6 +45,8 @@ class Composed(NamedTuple):
     """Its ``MjSpec``: the model with equipment, parts and ground."""
     own: Recognized
     """What the motors of the model itself are."""
+    relative: tuple[ModelSensor, ...]
+    """Sensors of the motion of other spacecraft."""
 
 
 def compose(table: PlantTable, source: ModelSource | None = None) -> Composed:
@@ -67,7 +76,6 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
                 armature=not table.without_armature,
             )
         _add_surroundings(spec, bare)
-    _add_sensors(spec)
     of_model = _joint_names(spec)
     _attach_equipment(spec, table, before_parts=True)
     of_equipment = _joint_names(spec) - of_model
@@ -79,6 +87,14 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
     _attach_equipment(spec, table, before_parts=False)
     if table.ground is not None:
         table.ground.attach(spec)
+    with input_error_at("plant.spacecraft"):
+        for name, other in table.spacecraft.items():
+            other.attach(spec, name, bus_of(spec))
+    with input_error_at("plant.ports"):
+        other_spacecraft.add_ports(spec, table.ports, bus_of(spec))
+    others = other_spacecraft.names_of(spec)
+    relative = relative_motion.add_sensors(spec, bus_of(spec).name, others, table.connections)
+    _add_sensors(spec, whole="world" if others else bus_of(spec).name)
     stops = any(hinge.stops for hinge in table.hinges.values())
     if stops:
         # The torques on a gimbal and on what carries it differ by the solver's remainder: at its
@@ -87,7 +103,7 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
     if spec.equalities or stops:
         # A model of free bodies needs no constraints; a cord that unwinds and a gimbal's stop do.
         spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    return Composed(spec, own)
+    return Composed(spec, own, relative)
 
 
 def bus_of(spec: Any) -> Any:
@@ -110,11 +126,13 @@ def _load(name: str) -> Any:
     return mujoco.MjSpec.from_file(str(known[name]))
 
 
-def _add_sensors(spec: Any) -> None:
-    """Add what the log has of the whole vehicle."""
-    bus, kind = bus_of(spec).name, mujoco.mjtSensor
-    body = mujoco.mjtObj.mjOBJ_BODY
-    spec.add_sensor(name=MOMENTUM, type=kind.mjSENS_SUBTREEANGMOM, objtype=body, objname=bus)
+def _add_sensors(spec: Any, whole: str) -> None:
+    """Add what the log has of the ``whole``: the tree of bodies on that one."""
+    kind, body = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_BODY
+    spec.add_sensor(name=MOMENTUM, type=kind.mjSENS_SUBTREEANGMOM, objtype=body, objname=whole)
+    if whole == "world":
+        name = relative_motion.CENTER_VELOCITY
+        spec.add_sensor(name=name, type=kind.mjSENS_SUBTREELINVEL, objtype=body, objname=whole)
     spec.add_sensor(name=KINETIC, type=kind.mjSENS_E_KINETIC)
     spec.add_sensor(
         name=ENVIRONMENT, type=kind.mjSENS_USER, dim=6, needstage=mujoco.mjtStage.mjSTAGE_VEL

@@ -75,7 +75,7 @@ class Deployments(StepEffect):
         return memory
 
     def prepare(
-        self, physics: Array, time: Array, known: Array
+        self, memory: State, physics: Array, time: Array, known: Array
     ) -> tuple[list[Write], Array | None]:
         """Return what each writes, and where one has an event."""
         writes, reports = list[Write](), []

@@ -69,10 +69,11 @@ def recognize(model: Any, roles: Roles) -> Recognized:
     """Return what the motors of a compiled model with named motors are.
 
     Raises:
-        ValueError: there is not one free joint, or another joint comes before it; a pattern of
+        ValueError: another joint comes before that of the vehicle, which is the first free body
+            where ``roles`` names none; a pattern of
             ``roles`` matches no motor, or one that cannot have that role.
     """
-    _check_bus(model)
+    _check_bus(model, roles.bus)
     can_be_wheels = {i for i in range(model.nu) if _is_torque_motor(model, i)}
     can_be_thrusters = {i for i in range(model.nu) if _is_force_at_site(model, i)}
     wheels = _chosen(model, "wheels", roles.wheels, can_be_wheels, "torque motors of hinges")
@@ -125,18 +126,13 @@ def places_and_directions(model: Any, thrusters: Sequence[Motor]) -> tuple[Array
     return np.reshape(places, (-1, 3)), np.reshape(ways, (-1, 3))
 
 
-def _check_bus(model: Any) -> None:
+def _check_bus(model: Any, bus: str | None) -> None:
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    names = [model.body(model.jnt_bodyid[joint]).name for joint in free]
-    if len(free) == 1 and free[0] == 0:
-        return
-    if len(names) == 1:
+    vehicle = model.body(model.jnt_bodyid[free[0]]).name if bus is None else bus
+    if model.body(model.jnt_bodyid[0]).name != vehicle:
         first = model.joint(0).name
-        problem = f"the joint {first!r} comes before {names[0]!r}, which is free: put it first"
-    else:
-        listed = ", ".join(map(repr, names)) or "none"
-        problem = f"{len(free)} bodies have a free joint, {listed}: one vehicle flies alone"
-    raise ValueError(f"plant.model: {problem}")
+        problem = f"the joint {first!r} comes before {vehicle!r}, which is free: put it first"
+        raise ValueError(f"plant.model: {problem}")
 
 
 def _chosen(

@@ -146,7 +146,7 @@ class StepEffect(ABC):
         return np.zeros((1, 1), bool)
 
     def prepare(
-        self, physics: Array, time: Array, known: Array
+        self, memory: State, physics: Array, time: Array, known: Array
     ) -> tuple[list[Write], Array | None]:
         """Return (what it writes into MuJoCo's data, report) for the step that begins at ``time``.
 

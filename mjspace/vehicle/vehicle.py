@@ -20,6 +20,7 @@ from mjspace.scenario.equipment import Driven
 from mjspace.scenario.model_source import ModelSource
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.vehicle import composition, indices, mass_properties, model_checks, own_model
+from mjspace.vehicle.model_sensors import ModelSensor
 from mjspace.vehicle.roles import Recognized
 
 
@@ -53,6 +54,8 @@ class Vehicle:
     """What of the model its actuators drive, by name."""
     own: Recognized
     """What the motors of a user's own model are; none of another."""
+    relative: tuple[ModelSensor, ...]
+    """Sensors of the motion of other spacecraft, and at the ports of connections."""
     speed_limit: Array
     """Largest speed of each wheel relative to the bus [rad/s], shape (n,); inf without a limit."""
     momentum: slice
@@ -61,6 +64,11 @@ class Vehicle:
     """In ``sensordata``: kinetic energy [J]."""
     environment: slice
     """In ``sensordata``: force [N], inertial axes, and torque [N m], body axes, on the bus."""
+
+    @property
+    def sensors(self) -> tuple[ModelSensor, ...]:
+        """The sensors of the compiled model that laws receive by their names."""
+        return (*self.own.sensors, *self.relative)
 
     @property
     def motors(self) -> tuple[str, ...]:
@@ -83,7 +91,7 @@ def build(
     Warns:
         UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown unchanged.
     """
-    spec, own = composition.compose(table, source)
+    spec, own, relative = composition.compose(table, source)
     spec.option.timestep = rates.physics
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{rates.integrator.upper()}")
     spec.nuserdata = userdata
@@ -115,6 +123,7 @@ def build(
     return Vehicle(
         model=model,
         own=own,
+        relative=relative,
         inertia=indices.frozen(gyrostat),
         wheel_axes=indices.frozen(axes),
         wheel_inertia=indices.frozen(inertia),
@@ -183,7 +192,8 @@ def _padded(limits: Array, count: int) -> Array:
 
 
 def _set_joints(model: Any, data: Any, initial: Initial) -> None:
-    known = {model.joint(i).name: i for i in range(1, model.njnt)}  # the free joint is the first
+    free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+    known = {model.joint(i).name: i for i in np.flatnonzero(~free)}
     for name in (*initial.joint_position, *initial.joint_speed):
         if name not in known:
             raise ValueError(f"initial: no joint {name!r} among the parts: have {', '.join(known)}")

@@ -89,7 +89,7 @@ def _measured(assembly: Assembly) -> dict[str, Field]:
             _sentence(about.get(quantity, quantity.replace("_", " "))),
             quantity,
         )
-    for own in assembly.vehicle.own.sensors:
+    for own in assembly.vehicle.sensors:
         if own.measured:
             about_it = f"The model's own sensor {own.name}, MuJoCo's {own.kind}"
             found[own.field] = Field((own.size,), own.unit, about_it, own.field)

@@ -1,0 +1,1 @@
+"""Rendezvous: approach to another spacecraft, from relative navigation."""
