@@ -6,10 +6,10 @@ from mjspace.simulation.actuator_faults import ActuatorFaults
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.burning_mass import BurningMass
 from mjspace.simulation.magnetic_field import MagneticField
+from mjspace.simulation.model_sensors import ModelSensors
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_disturbance import UserDisturbance
 from mjspace.vehicle import deployments, ground_contact
-from mjspace.vehicle.model_sensors import ModelSensors
 from mjspace.vehicle.step_effect import StepEffect
 
 
@@ -18,11 +18,14 @@ def effects_of(
 ) -> tuple[StepEffect, ...]:
     """Return new effects, not yet bound to a batch, for these members of the campaign."""
     scenario, model = assembly.scenario, assembly.vehicle.model
+    sensors, around = assembly.vehicle.own.sensors, scenario.environment.gravity
+    gravity = None if around is None else around.acceleration
+    burning = BurningMass.of(assembly.actuators, observed=bool(sensors))
     every = (
         ground_contact.of(model, layout.struts, layout.velocity),
-        ModelSensors.of(model, assembly.vehicle.own.sensors),
+        burning,
+        ModelSensors.of(model, sensors, gravity, burns=burning is not None),
         ActuatorFaults.of(assembly, members),
-        BurningMass.of(assembly.actuators),
         MagneticField.of(assembly.field),
         UserDisturbance.of(assembly, layout),
         deployments.of(model, assembly.qpos, scenario.plant.parts, scenario.rates.physics),

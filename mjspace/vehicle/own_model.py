@@ -14,6 +14,7 @@ from mjspace.errors import nearest
 from mjspace.scenario.model_source import KINDS, ModelSource, read_source, source_of
 from mjspace.scenario.plant import Roles
 from mjspace.scenario.trust import Trust
+from mjspace.vehicle import model_sensors
 from mjspace.vehicle import roles as recognition
 from mjspace.vehicle.roles import Recognized
 
@@ -121,15 +122,18 @@ def prepare(
     _set_options(spec, lands=lands)
     for key in list(spec.keys):
         spec.delete(key)
+    for sensor in spec.sensors:  # a scenario says how one samples
+        sensor.nsample, sensor.delay, sensor.interval = 0, 0.0, np.zeros(2)
     model = compiled(spec)
     recognized = recognition.recognize(model, roles)
+    model_sensors.add_places(spec)
     for motor in (*recognized.wheels, *recognized.thrusters):
         number = model.actuator(motor.name).id
         _command_in_si(spec.actuator(motor.name), recognition.scale(model, number))
     if _is_constrained(model):
         # At its tolerance the solver would leave a remainder between a torque and its reaction.
         spec.option.tolerance = 0.0
-    else:
+    elif not lands:
         spec.option.disableflags |= int(_DISABLE.mjDSBL_CONSTRAINT)
     return recognized, model
 
