@@ -134,6 +134,8 @@ Count = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 SensorName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 """A field of the measurement: a sensor of one's own model keeps its capitals."""
+JointName = Annotated[str, Field(min_length=1)]
+"""As the model has it: of one's own it may be any text."""
 KindName = Annotated[str, WrapValidator(_marked)]
 """What names code. It stays marked as text of the command line."""
 FileName = Annotated[str, AfterValidator(_file_name)]

@@ -33,7 +33,8 @@ def open_source(model: str, trust: Trust) -> ModelSource:
     place, is_code, _ = model.partition(":")
     if place.endswith(".mjb"):
         raise ValueError(
-            f"{model} is compiled, and nothing can be added to it: give the MJCF it was made of"
+            f"{model} is compiled, and nothing can be added to it: give the MJCF it was made of, as "
+            "mj_saveLastXML writes it"
         )
     if not is_code:
         return read_source(model, trust)
