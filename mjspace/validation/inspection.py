@@ -199,6 +199,13 @@ def _replaced(model: Any) -> Iterator[str]:
         touching = (model.geom_contype | model.geom_conaffinity).any()
         if touching:
             yield "contacts are switched off, unless it lands on a [plant.ground]"
+    exact = np.flatnonzero(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_FILTEREXACT)
+    if exact.size:
+        names = ", ".join(repr(model.actuator(motor).name) for motor in exact)
+        yield (
+            f"dyntype filterexact of {names} is flown as filter, which is the same lag: MuJoCo's "
+            "RK4 is of first order in the other"
+        )
     if model.nkey:
         yield f"its {model.nkey} keyframes are left out: [initial] says how it begins"
 

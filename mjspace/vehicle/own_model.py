@@ -33,8 +33,8 @@ def open_source(model: str, trust: Trust) -> ModelSource:
     place, is_code, _ = model.partition(":")
     if place.endswith(".mjb"):
         raise ValueError(
-            f"{model} is compiled, and nothing can be added to it: give the MJCF it was made of, as "
-            "mj_saveLastXML writes it"
+            f"{model} is compiled, and nothing can be added to it: give the MJCF it was made of, "
+            "as mj_saveLastXML writes it"
         )
     if not is_code:
         return read_source(model, trust)
@@ -123,6 +123,9 @@ def prepare(
     _set_options(spec, lands=lands)
     for key in list(spec.keys):
         spec.delete(key)
+    for motor in spec.actuators:
+        if motor.dyntype == mujoco.mjtDyn.mjDYN_FILTEREXACT:
+            motor.dyntype = mujoco.mjtDyn.mjDYN_FILTER  # the same lag, to RK4's order
     for sensor in spec.sensors:  # a scenario says how one samples
         sensor.nsample, sensor.delay, sensor.interval = 0, 0.0, np.zeros(2)
     model = compiled(spec)
