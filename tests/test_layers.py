@@ -38,7 +38,7 @@ ROOMS = {
     "tracing": "gufunc",
     "vehicle": "contract errors scenario",
     "environment": "contract scenario vehicle",
-    "sensors": "attitude contract gufunc scenario units",
+    "sensors": "attitude contract errors gufunc scenario units",
     "actuators": ("contract environment errors gufunc scenario sensors signals units vehicle"),
     "log": "attitude contract errors scenario units",
     "plotting": "contract errors log scenario signals units",

@@ -36,7 +36,7 @@ def units_of(assembly: Assembly, kinds: Mapping[str, type] = {}) -> dict[str, di
             units["/measurement"].setdefault(name, Unit(sensor.unit))
             units["/truth"].setdefault(sensor.measures, Unit(sensor.unit))
     for own in assembly.vehicle.sensors:
-        if own.measured and own.unit:
+        if own.unit:
             units["/measurement"][own.field] = units["/truth"][own.field] = Unit(own.unit)
     return units
 

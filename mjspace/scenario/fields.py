@@ -23,7 +23,7 @@ from mjspace.contract import Array
 from mjspace.errors import is_file_name, shortened
 from mjspace.ranges import FORMS, Form
 from mjspace.scenario.trust import CommandLineText
-from mjspace.units import Unit, quantity, to_si
+from mjspace.units import Quantity, Unit, quantity, to_si
 
 _IN_PEOPLES_UNITS = {"rad": "deg", "rad/s": "deg/s", "m": "km", "s": "min"}
 
@@ -118,12 +118,24 @@ def _marked(name: Any, inner: ValidatorFunctionWrapHandler) -> Any:
     return name if isinstance(name, CommandLineText) else inner(name)
 
 
+def _in_any_unit(value: Any, inner: ValidatorFunctionWrapHandler) -> Any:
+    found = to_si(value, None)
+    number = inner(found)
+    return found if isinstance(found, Quantity) else number
+
+
+AnyUnit = WrapValidator(_in_any_unit)
+"""Of a number in SI, or a ``Quantity`` whose unit is judged where it is known which is right."""
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
 Switch = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+SensorName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+"""A field of the measurement: a sensor of one's own model keeps its capitals."""
+JointName = Annotated[str, Field(min_length=1)]
+"""As the model has it: of one's own it may be any text."""
 KindName = Annotated[str, WrapValidator(_marked)]
 """What names code. It stays marked as text of the command line."""
 FileName = Annotated[str, AfterValidator(_file_name)]

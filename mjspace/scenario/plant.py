@@ -11,6 +11,7 @@ from mjspace.scenario.equipment import Equipment
 from mjspace.scenario.fields import (
     Angles3,
     Finite,
+    JointName,
     KindName,
     Matrix3,
     Meters3,
@@ -119,10 +120,10 @@ class PlantTable(Table):
     parts: dict[Name, Part] = {}
     """By a name of one's own: ``[plant.parts.damper]``. They add to the bus's mass and inertia, and
     to neither ``gyrostat_inertia`` nor the ``inertia`` that a law is given."""
-    hinges: dict[Name, Hinge] = {}
-    """Bearings of the parts' hinges, by the hinge: ``[plant.hinges.cmg_wheel]``."""
+    hinges: dict[JointName, Hinge] = {}
+    """Bearings of the model's and the parts' hinges, by the hinge: ``[plant.hinges.cmg_wheel]``."""
     ripple: dict[
-        Name,
+        JointName,
         Annotated[Any, DeclaredIn("mjspace.environment.torque_ripple:Ripple", optional=False)],
     ] = {}
     """Torque ripple of motors, by the hinge."""
@@ -232,10 +233,11 @@ class Initial(Table):
     wheel_speed: Annotated[list[Finite], Si("rad/s")] | None = None
     """Wheel speeds relative to what carries them; zero when left out. Bias speeds whose momenta
     cancel, as [b, -b, b, -b] in a pyramid, keep the wheels away from zero."""
-    joint_position: dict[Name, Finite] = {}
-    """Positions of the parts' joints, by name [rad or m]; the model's own when left out."""
-    joint_speed: dict[Name, Finite] = {}
-    """Speeds of the parts' joints, by name [rad/s or m/s]."""
+    joint_position: dict[JointName, Finite] = {}
+    """Positions of the model's and the parts' hinges and slides, by name [rad or m]; the model's
+    own when left out."""
+    joint_speed: dict[JointName, Finite] = {}
+    """Speeds of the model's and the parts' hinges and slides, by name [rad/s or m/s]."""
     momentum: Momentum3 | None = None
     """Or the desired total angular momentum about the centre of mass, inertial axes: the wheel
     speeds follow (the smallest, where more than three wheels can make it)."""

@@ -1,14 +1,13 @@
 """Regions of a signal: the values between bounds."""
 
-from typing import Any, Self
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidatorFunctionWrapHandler, field_validator, model_validator
+from pydantic import model_validator
 
 from mjspace.contract import Array
-from mjspace.scenario.fields import Finite, Table
-from mjspace.units import Quantity, to_si
+from mjspace.scenario.fields import AnyUnit, Finite, Table
 
 
 class Region(Table):
@@ -17,17 +16,10 @@ class Region(Table):
     signal: str
     """``topic.field`` or ``topic.field[i]`` of the log: ``truth.attitude_error``; of a vector its
     norm."""
-    below: Finite | None = None
+    below: Annotated[Finite, AnyUnit] | None = None
     """It must be less; a number in SI or a quantity."""
-    above: Finite | None = None
+    above: Annotated[Finite, AnyUnit] | None = None
     """It must be greater; a number in SI or a quantity."""
-
-    @field_validator("below", "above", mode="wrap")
-    @classmethod
-    def _quantity(cls, value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
-        found = to_si(value, None)
-        number = validated(found)
-        return found if isinstance(found, Quantity) else number  # the flight knows the signal's
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:

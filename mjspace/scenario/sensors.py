@@ -8,7 +8,7 @@ from mjspace.contract import REPORTED_BY_PLANT
 from mjspace.errors import nearest
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Name
+from mjspace.scenario.fields import SensorName
 
 KINDS = {
     "attitude": "mjspace.sensors.star_tracker:StarTracker",
@@ -21,8 +21,10 @@ KINDS = {
     "specific_force": "mjspace.sensors.accelerometer:Accelerometer",
     "magnetic_field": "mjspace.sensors.magnetometer:Magnetometer",
     "nadir": "mjspace.sensors.horizon:HorizonSensor",
+    "model": "mjspace.sensors.model_sensor:OfModel",
 }
-"""The sensor of each quantity, "module:Class": the class is imported when a scenario is read."""
+"""The sensor of each quantity, "module:Class": the class is imported when a scenario is read. Those
+of "model" are the sensors that the vehicle's own model has."""
 ALWAYS = ("attitude", "rate", "wheel_speed")
 """Quantities that an ideal sensor measures where the scenario declares none."""
 
@@ -69,7 +71,8 @@ def _of_its_kind(table: Any, info: ValidationInfo) -> Any:
 
 
 Sensors = Annotated[
-    dict[Name, Annotated[Any, BeforeValidator(_of_its_kind)]], BeforeValidator(_with_quantities)
+    dict[SensorName, Annotated[Any, BeforeValidator(_of_its_kind)]],
+    BeforeValidator(_with_quantities),
 ]
 """The sensors by their names, in the order in which the scenario declares them."""
 

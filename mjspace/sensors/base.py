@@ -1,7 +1,7 @@
 """What every sensor has: a quantity, timing and errors."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -19,13 +19,24 @@ _NONE: Any = 0.0
 _RENAMED = {"noise": "noise_std", "bias": "bias_std"}
 
 
+class OwnSensor(NamedTuple):
+    """What is known of a sensor that the vehicle's own model has."""
+
+    size: int
+    """How many numbers it reports."""
+    unit: str
+    """Of them; "" where there is none."""
+    is_attitude: bool
+    """Whether it reports a quaternion."""
+
+
 @dataclass(frozen=True)
 class Surroundings:
     """What a vehicle's sensors need to know of the vehicle and of where it flies."""
 
     wheels: int = 0
-    own_sensors: tuple[str, ...] = ()
-    """Fields of the truth that the sensors of the vehicle's own model have read."""
+    own_sensors: Mapping[str, OwnSensor] = field(default_factory=dict)
+    """The sensors of the vehicle's own model, by the field of the truth that they have read."""
     gravity: Callable[[Array], Array] = np.zeros_like
     """What accelerometers do not measure [m/s^2], (..., 3), at each position [m], (..., 3)."""
     magnetic_field: Callable[[Array], Array] | None = None
@@ -86,6 +97,8 @@ class Sensor(Table, Generic[Deviation]):
     integrates: ClassVar[bool] = False
     """Whether a sample depends on the one before: it then has ``begin`` and ``mean``, and no
     ``true_value``."""
+    at_control: ClassVar[bool] = False
+    """Whether it can sample at control instants only."""
 
     @model_validator(mode="before")
     @classmethod
@@ -103,6 +116,19 @@ class Sensor(Table, Generic[Deviation]):
     def errs(self) -> bool:
         """Whether a sample may differ from the quantity's true value."""
         return any((self.noise_std, self.bias_std, self.bias_walk, self.quantization))
+
+    def quantity(self, name: str) -> str:
+        """Return the field of the truth that a sensor of that ``name`` samples."""
+        return self.measures
+
+    def axes_of(self, name: str, surroundings: Surroundings) -> int:
+        """Return on how many axes a sensor of that ``name`` errs.
+
+        Raises:
+            ValueError: the vehicle has nothing that it could measure.
+        """
+        width = surroundings.wheels if self.width is None else self.width
+        return width if self.axes is None else self.axes
 
     def check_environment(self, environment: Environment) -> None:
         """Raise a ValueError where there is nothing that the sensor could measure."""

@@ -31,8 +31,16 @@ class StarTracker(Sensor[Annotated[NonNegative, Si("rad")]]):
         error of an angle rounded to a digit, digit / sqrt(12), about every axis in every attitude,
         which rounded Euler angles or rotation vectors have not.
         """
-        turned: Array = _turn.ufunc(value, error, self.quantization)
-        return turned
+        return turned(value, error, self.quantization)
+
+
+def turned(q: Array, error: Array, digit: float) -> Array:
+    """Return the quaternion (..., 4) turned by a rotation vector (..., 3), rounded to half digits.
+
+    A ``digit`` of 0 leaves it as it is.
+    """
+    result: Array = _turn.ufunc(q, error, digit)
+    return result
 
 
 @gufunc(["void(f8[:], f8[:], f8, f8[:])"], "(q),(a),()->(q)")

@@ -51,17 +51,18 @@ class SensorSuite:
         """
         self._surroundings, self._steps = surroundings, rates.steps
         self.measurement = Measurement._with_sensors(
-            {name: table.measures for name, table in sensors.items()}
+            {name: table.quantity(name) for name, table in sensors.items()}
         )
         every = [
-            _sampled(name, table, rates, seed, members, surroundings.wheels)
+            _sampled(name, table, rates, seed, members, surroundings)
             for name, table in sensors.items()
         ]
         self._sampled = [sensor for sensor in every if sensor is not None]
         own = {sensor.name for sensor in self._sampled}
-        self._ideal = {n: table.measures for n, table in sensors.items() if n not in own}
+        self._ideal = {n: table.quantity(n) for n, table in sensors.items() if n not in own}
         self._reported = [name for name in REPORTED_BY_PLANT if name != "wheel_speed"]
-        self._reported += surroundings.own_sensors
+        sampled = {table.quantity(name) for name, table in sensors.items()}
+        self._reported += [name for name in surroundings.own_sensors if name not in sampled]
         # The fields of a truth that is reported as it is, without a copy.
         same = not self._sampled and all(name == q for name, q in self._ideal.items())
         self._as_it_is = {*self._ideal, *self._reported} if same else set()
@@ -75,7 +76,7 @@ class SensorSuite:
             if table.integrates:
                 value = table.begin(state, sensor.name, truth)
             else:
-                value = getattr(truth, table.measures)
+                value = getattr(truth, sensor.quantity)
             if table.bias_walk:
                 state[sensor.walk_field] = np.zeros_like(sensor.bias)
             first = sensor.read(state, 0, value)
@@ -176,7 +177,7 @@ class SensorSuite:
         """Put the sample of this step, and the walk that follows it, into ``state``."""
         table, index = sensor.table, step_index // sensor.period
         if not table.integrates:
-            value = getattr(truth, table.measures)
+            value = getattr(truth, sensor.quantity)
         elif index == 0:
             value = table.begin(state, sensor.name, truth)
         else:
@@ -196,6 +197,7 @@ class _Sampled:
 
     name: str
     table: Sensor[Any]
+    quantity: str  # the field of the truth that it samples
     period: int  # integration steps
     span: float  # of a period [s]
     delay: int  # samples
@@ -223,12 +225,20 @@ def _sampled(
     rates: Rates,
     seed: int,
     members: Sequence[int],
-    wheels: int,
+    surroundings: Surroundings,
 ) -> _Sampled | None:
     """Return the sensor, or None when at every control instant it reports the truth itself."""
+    axes = table.axes_of(name, surroundings)
+    if name in surroundings.own_sensors and table.quantity(name) != name:
+        raise ValueError(
+            f'sensors.{name}: the model has a sensor of that name: measures = "model" gives it '
+            "errors; else call this one otherwise"
+        )
     period_key = "rates.control" if table.period is None else f"sensors.{name}.period"
     seconds = rates.control if table.period is None else table.period
     period = whole_number(seconds, rates.physics, period_key, "rates.physics")
+    if table.at_control and period % rates.steps:
+        whole_number(seconds, rates.control, f"sensors.{name}.period", "rates.control")
     if not (table.errs or table.integrates or table.delay or rates.steps % period):
         return None
     delay = table.delay and whole_number(table.delay, seconds, f"sensors.{name}.delay", period_key)
@@ -237,13 +247,12 @@ def _sampled(
             f"sensors.{name}.delay: {table.delay:g} s is {delay:g} times {period_key}: at most "
             f"{MOST_SAMPLES}, as each sample is kept and logged"
         )
-    width = wheels if table.width is None else table.width
-    axes = width if table.axes is None else table.axes
     stream = stream_of(name)
     constant, white, increment = (normals(seed, members, (stream, part), axes) for part in range(3))
     return _Sampled(
         name=name,
         table=table,
+        quantity=table.quantity(name),
         period=period,
         span=period * rates.physics,
         delay=int(delay),

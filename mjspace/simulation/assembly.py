@@ -20,7 +20,7 @@ from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.scenario.user_files import files_of, source_of
-from mjspace.sensors.base import Surroundings
+from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
@@ -81,10 +81,10 @@ class Assembly:
         orbit = self.scenario.environment.orbit
         return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
-            own_sensors=(
-                *(sensor.field for sensor in self.vehicle.sensors if sensor.measured),
-                *(f"{name}_closed" for name in self.scenario.plant.connections),
-            ),
+            own_sensors={
+                s.field: OwnSensor(s.size, s.unit, s.is_attitude) for s in self.vehicle.sensors
+            }
+            | {f"{n}_closed": OwnSensor(1, "", False) for n in self.scenario.plant.connections},
             gravity=self._gravity,
             magnetic_field=None if self.field is None else self.field.at,
             orbit_position=None if orbit is None else partial(orbit_position, orbit),

@@ -23,8 +23,10 @@ from mjspace.tracing.replay import address_of, copy_bytes, placed, run
 _NUMBER, _TABLE = np.int64, (np.int64, (2,))  # a table: its address, its rows
 ORDERS = np.dtype([
     # MuJoCo's functions, and the state that mj_getState and mj_setState mean
-    ("step", _NUMBER), ("step1", _NUMBER), ("forward", _NUMBER), ("setConst", _NUMBER),
-    ("getState", _NUMBER), ("setState", _NUMBER), ("state", _NUMBER),
+    ("step", _NUMBER), ("forward", _NUMBER), ("setConst", _NUMBER), ("getState", _NUMBER),
+    ("setState", _NUMBER), ("state", _NUMBER),
+    # that of them which computes what step effects look at at a control instant
+    ("observe", _NUMBER),
     # numbers of the block's first period and of the flight's last, which is not flown
     ("first", _NUMBER), ("last", _NUMBER),
     # halves to be flown: 2 k is the control instant of the block's period k, 2 k + 1 its steps
@@ -196,7 +198,7 @@ def _begin_period(
     Return whether there is an event. At the first instant Python has looked.
     """
     if k and orders.looks:
-        of_model_and_data(orders.step1, model, data)
+        of_model_and_data(orders.observe, model, data)
         if _look(orders, words, base, fields):
             return True
     run(_table(orders.sensing, 5), words)

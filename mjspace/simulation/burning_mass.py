@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mjspace.actuators.actuator_set import ActuatorSet
-from mjspace.contract import Array
+from mjspace.contract import Array, Event
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 
@@ -17,33 +17,46 @@ class BurningMass(StepEffect):
     not_compiled = ""
 
     @classmethod
-    def of(cls, actuators: ActuatorSet) -> Self | None:
-        """Return the effect for ``actuators``; None where none of them burns anything."""
-        state = actuators.reset(1)
-        return cls(actuators) if actuators.masses(state, state) else None
+    def of(cls, actuators: ActuatorSet, *, observed: bool) -> Self | None:
+        """Return the effect for ``actuators``; None where none of them burns anything.
 
-    def __init__(self, actuators: ActuatorSet) -> None:
+        ``observed`` is whether anything is computed of the masses at control instants.
+        """
+        state = actuators.reset(1)
+        return cls(actuators, observed=observed) if actuators.masses(state, state) else None
+
+    def __init__(self, actuators: ActuatorSet, *, observed: bool) -> None:
         """Keep the ``actuators`` that know what burns."""
-        self._actuators = actuators
+        self._actuators, self._observed = actuators, observed
         self._batch: Any = None
 
     def bind(self, batch: Any) -> None:
         """Take the batch whose model's fields change."""
         self._batch = batch
 
+    def observe(self, memory: State, physics: Array, time: float, events: list[Event]) -> State:
+        """Set the masses of the control instant, where they are observed."""
+        if self._observed:
+            self._set(memory, memory)
+        return memory
+
     def before_step(self, memory: State, instant: Instant) -> State:
+        """Set the masses of the middle of the step."""
+        self._set(instant.memory, memory)
+        return memory
+
+    def _set(self, before: State, after: State) -> None:
         """Set masses and inertias.
 
         The constants that MuJoCo derives from them take 0.6 of a step's time: they are derived
         again only where something burns.
         """
-        changes = self.masses(instant.memory, memory)
+        changes = self.masses(before, after)
         fields = [(self._batch.expand(name)[:, body], values) for name, body, values in changes]
         if any(not np.array_equal(field, values) for field, values in fields):
             for field, values in fields:
                 field[:] = values
             self._batch.set_const()
-        return memory
 
     def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
         """Return the masses and inertias in the middle of the step."""

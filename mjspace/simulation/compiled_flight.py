@@ -224,7 +224,7 @@ class CompiledFlight:
         rates, model = assembly.scenario.rates, assembly.vehicle.model
         words_of_model, words_of = struct_offsets.find()
         orders = np.zeros((), ORDERS)
-        for function in ("step", "step1", "forward", "setConst", "getState", "setState"):
+        for function in ("step", "forward", "setConst", "getState", "setState"):
             orders[function] = address(f"mj_{function}")
         orders["state"] = int(INTEGRATION)
         orders["steps"], orders["driven"] = rates.steps, assembly.driven_stepwise
@@ -266,6 +266,8 @@ class CompiledFlight:
         orders["bodies"] = model.nbody
         orders["most_constraints"] = struct_offsets.most_constraints()
         looking = [effect for effect in self._effects if effect.looks]
+        of_forces = any(effect.of_forces for effect in looking)
+        orders["observe"] = address("mj_forward" if of_forces else "mj_step1")
         orders["looks"] = bool(looking)
         orders["looks_in_steps"] = any(effect.every_step for effect in looking)
         for name in ("looking", "sensing", "preparing"):

@@ -8,8 +8,8 @@ import numpy as np
 from mjspace.contract import TICK, Array, Event, Measurement
 from mjspace.environment.connection import CLOSED, OPEN, RELEASED, Connection, Latch
 from mjspace.environment.install import places_of
+from mjspace.simulation import model_sensors
 from mjspace.simulation.assembly import Assembly
-from mjspace.vehicle import model_sensors
 from mjspace.vehicle.relative_motion import CENTER_VELOCITY
 from mjspace.vehicle.step_effect import Instant, State, StepEffect, Write
 

@@ -7,10 +7,10 @@ from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.burning_mass import BurningMass
 from mjspace.simulation.connections import Connections
 from mjspace.simulation.magnetic_field import MagneticField
+from mjspace.simulation.model_sensors import ModelSensors, depend_on_masses
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_disturbance import UserDisturbance
 from mjspace.vehicle import deployments, ground_contact
-from mjspace.vehicle.model_sensors import ModelSensors
 from mjspace.vehicle.step_effect import StepEffect
 
 
@@ -19,12 +19,15 @@ def effects_of(
 ) -> tuple[StepEffect, ...]:
     """Return new effects, not yet bound to a batch, for these members of the campaign."""
     scenario, model = assembly.scenario, assembly.vehicle.model
+    sensors, around = assembly.vehicle.sensors, scenario.environment.gravity
+    gravity = None if around is None else around.acceleration
+    burning = BurningMass.of(assembly.actuators, observed=depend_on_masses(sensors))
     every = (
         ground_contact.of(model, layout.struts, layout.velocity),
-        ModelSensors.of(model, assembly.vehicle.sensors),
+        burning,
+        ModelSensors.of(model, sensors, gravity, burns=burning is not None),
         Connections.of(assembly),
         ActuatorFaults.of(assembly, members),
-        BurningMass.of(assembly.actuators),
         MagneticField.of(assembly.field),
         UserDisturbance.of(assembly, layout),
         deployments.of(model, assembly.qpos, scenario.plant.parts, scenario.rates.physics),

@@ -10,7 +10,7 @@ import numpy as np
 
 from mjspace.contract import Array
 from mjspace.environment.connection import Latch
-from mjspace.environment.install import places_of
+from mjspace.environment.install import install_callbacks, places_of
 from mjspace.environment.magnetic_field import FIELD, MOMENT
 from mjspace.errors import InputError
 from mjspace.scenario.scenario import Scenario
@@ -90,6 +90,7 @@ def state_of_log(assembly: Assembly, physics: Array) -> Array:
 
 def start_at(assembly: Assembly, physics: Array, members: Sequence[int]) -> Start:
     """Return time zero with the vehicles at ``physics`` (N, nstate) and nothing remembered."""
+    install_callbacks()
     layout = StateLayout(assembly)
     effects = effects_of(assembly, layout, members)
     memory = assembly.actuators.reset(len(members))

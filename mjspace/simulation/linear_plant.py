@@ -37,6 +37,11 @@ class LinearPlant:
     """SI units, texts, shape (n,)."""
     input_units: Array
     """Shape (m,)."""
+    input_least: Array
+    """Of each input, shape (m,); -inf without a limit. Where it is 0, as a thruster's, the columns
+    of B and Bd hold for what is above."""
+    input_largest: Array
+    """Of each input, shape (m,); inf without a limit."""
     output_units: Array
     """Shape (p,)."""
     noise_std: Array

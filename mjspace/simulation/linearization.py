@@ -2,8 +2,9 @@
 
 The states are errors from the nominal motion: ``position`` of the bus, inertial axes; ``attitude``,
 the rotation vector from the nominal to the true body axes, in body axes; angles of hinges; and
-their rates: ``velocity``, inertial axes, ``rate``, body axes, speeds of hinges. The rows of A that
-are kinematics are exact, as attitude' = rate - w x attitude at the nominal rate w.
+their rates: ``velocity``, inertial axes, ``rate``, body axes, speeds of hinges; and activations of
+a model's own motors. The rows of A that are kinematics are exact, as attitude' = rate - w x
+attitude at the nominal rate w.
 """
 
 from collections.abc import Iterable, Iterator
@@ -22,6 +23,7 @@ from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, without_law
 from mjspace.simulation.flight_software.interface import Field, Fields, interface_of, named_tuple
 from mjspace.simulation.initial_state import INTEGRATION, initial_physics, start_at
+from mjspace.simulation.linear_inputs import inputs_of, names_of, refuse_bent
 from mjspace.simulation.linear_plant import LinearPlant
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.stepper import Stepper
@@ -30,10 +32,6 @@ from mjspace.vehicle.vehicle import Vehicle
 _OF_HINGES = ("wheel_speed", "gimbal_angle", "gimbal_rate", "wheel_angle")
 _STEP = 1e-5
 """Of a state, in SI, or as a part of it where it is larger than 1."""
-_PART = 1e-3
-"""Step of an input, as a part of its limit, or in SI where it has none."""
-_LINEAR = 1e-3
-"""How much the slopes to either side of an input may differ, as a part of them."""
 
 
 def linearize(
@@ -41,8 +39,9 @@ def linearize(
 ) -> LinearPlant:
     """Return the vehicle of a scenario, by name or path, linearized about its initial state.
 
-    The command about which it is linearized is zero. The law does not matter; ``overrides`` and
-    ``trust`` are as in ``mjspace.run``.
+    The command about which it is linearized is zero; an input whose range begins there, as a
+    thruster's, has its slope to that side. The law does not matter; ``overrides`` and ``trust`` are
+    as in ``mjspace.run``.
 
     Raises:
         InputError: bad input; or an actuator that has a state of its own, or that is not linear in
@@ -60,27 +59,34 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
     """
     _refuse_memory(assembly)
     interface = interface_of(assembly)
-    steps = _input_steps(assembly, interface.command)
+    inputs = inputs_of(assembly, interface.command)
     model, vehicle = assembly.vehicle.model, assembly.vehicle
     names, units = zip(*_states(vehicle), strict=True)
     kept = [i for i, name in enumerate(names) if name]
     nominal = initial_physics(assembly, 1)[0]
     moved, step = _perturbed(model, nominal)
-    nx, nu = 2 * model.nv, len(steps)
-    # The nominal vehicle; each state moved up and down; each input moved up and down.
-    physics = np.concatenate([nominal[None], moved, np.repeat(nominal[None], 2 * nu, axis=0)])
+    nx, nu = len(step), len(inputs.step)
+    # The nominal vehicle; each state moved up and down; each input moved up and down from its
+    # centre, which comes last.
+    physics = np.concatenate([nominal[None], moved, np.repeat(nominal[None], 3 * nu, axis=0)])
+    moves_of_inputs = 1 + 2 * nx + np.arange(2 * nu)
     commands = np.zeros((len(physics), nu))
-    commands[1 + 2 * nx :: 2] = np.diag(steps)
-    commands[2 + 2 * nx :: 2] = np.diag(-steps)
-    h = np.concatenate([step, steps])
+    commands[moves_of_inputs[::2]] = np.diag(inputs.centre + inputs.step)
+    commands[moves_of_inputs[1::2]] = np.diag(inputs.centre - inputs.step)
+    commands[len(commands) - nu :] = np.diag(inputs.centre)
+    h = np.concatenate([step, inputs.step])
 
     def slopes(values: Array) -> Array:
-        return ((values[1::2] - values[2::2]) / (2.0 * h[:, None])).T
+        moved = values[1 : 1 + 2 * len(h)]
+        return ((moved[::2] - moved[1::2]) / (2.0 * h[:, None])).T
 
-    accelerations, truth = _at_once(assembly, physics, commands, interface.command)
-    _refuse_bent(accelerations[0], accelerations[1 + 2 * nx :], list(_names(interface.command)))
-    dynamics = slopes(accelerations)
-    kinematics = np.hstack([np.zeros((model.nv, model.nv)), np.eye(model.nv)])
+    derivatives, truth = _at_once(assembly, physics, commands, interface.command)
+    of_inputs = derivatives[len(commands) - nu :], derivatives[moves_of_inputs]
+    refuse_bent(*of_inputs, [f"command.{name}" for name in names_of(interface.command)])
+    of_activations = derivatives[1 + 4 * model.nv : 1 + 2 * nx]
+    refuse_bent(derivatives[:1], of_activations, names[2 * model.nv :])
+    dynamics = slopes(derivatives)
+    kinematics = np.eye(model.nv, nx, model.nv)
     rate = nominal[StateLayout(assembly).rate]
     kinematics[3:6, 3:6] = -cross_matrix(rate)  # after the position of the free joint
     after = _after_a_period(assembly, physics, commands, interface.command)
@@ -99,10 +105,12 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
         Bd=moves[:, nx:][kept],
         control_period=assembly.scenario.rates.control,
         states=np.array([names[i] for i in kept]),
-        inputs=np.array(list(_names(interface.command))),
-        outputs=np.array(list(_names(measured))),
+        inputs=np.array(list(names_of(interface.command))),
+        outputs=np.array(list(names_of(measured))),
         state_units=np.array([units[i] for i in kept]),
         input_units=np.array(list(_units(interface.command))),
+        input_least=inputs.least,
+        input_largest=inputs.largest,
         output_units=np.array(list(_units(measured))),
         noise_std=np.concatenate(noise),
     )
@@ -139,30 +147,38 @@ def _states(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
     yield from ((f"velocity[{i}]", "m/s") for i in range(3))
     yield from ((f"rate[{i}]", "rad/s") for i in range(3))
     yield from ((hinge(dof)[1], "m/s" if slides(dof) else "rad/s") for dof in hinges)
+    for motor in range(model.nu):
+        count, name = int(model.actuator_actnum[motor]), model.actuator(motor).name
+        yield from (
+            (f"{name}.activation[{i}]" if count > 1 else f"{name}.activation", "")
+            for i in range(count)
+        )
 
 
 def _perturbed(model: Any, nominal: Array) -> tuple[Array, Array]:
-    """Return states with each coordinate moved up and down, (4 nv, nstate), and the steps (2 nv,).
+    """Return states with each coordinate moved up and down, (2 n, nstate), and the steps (n,).
 
-    The coordinates are those of ``qvel``: a rotation is about body axes.
+    The coordinates are those of ``qvel``, a rotation about body axes, then ``qvel`` and ``act``.
     """
     data = mujoco.MjData(model)
     mujoco.mj_setState(model, data, nominal, INTEGRATION)
-    qpos, qvel = data.qpos.copy(), data.qvel.copy()
+    qpos, qvel, act = data.qpos.copy(), data.qvel.copy(), data.act.copy()
     tangent = np.zeros(model.nv)
     at_zero = mujoco.MjData(model).qpos
     mujoco.mj_differentiatePos(model, tangent, 1.0, at_zero, qpos)
-    steps = _STEP * np.maximum(1.0, np.abs(np.concatenate([tangent, qvel])))
+    steps = _STEP * np.maximum(1.0, np.abs(np.concatenate([tangent, qvel, act])))
     rows = []
     for i, step in enumerate(steps):
         for sign in (1.0, -1.0):
-            data.qpos, data.qvel = qpos, qvel
+            data.qpos, data.qvel, data.act = qpos, qvel, act
             if i < model.nv:
                 move = np.zeros(model.nv)
                 move[i] = sign * step
                 mujoco.mj_integratePos(model, data.qpos, move, 1.0)
-            else:
+            elif i < 2 * model.nv:
                 data.qvel[i - model.nv] += sign * step
+            else:
+                data.act[i - 2 * model.nv] += sign * step
             row = np.empty_like(nominal)
             mujoco.mj_getState(model, data, row, INTEGRATION)
             rows.append(row)
@@ -188,11 +204,11 @@ def _stepper(
 def _at_once(
     assembly: Assembly, physics: Array, commands: Array, fields: Fields
 ) -> tuple[Array, Any]:
-    """Return the accelerations in the coordinates of ``qvel``, (N, nv), and the truth."""
+    """Return accelerations and the activations' derivatives, (N, nv + na), and the truth."""
     stepper, period = _stepper(assembly, physics, commands, fields)
-    accelerations = stepper.batch.bind("qacc")
+    derivatives = [stepper.batch.bind(name) for name in ("qacc", "act_dot")]
     stepper.begin(period, flown=False)
-    return accelerations.copy(), period.truth
+    return np.concatenate(derivatives, axis=1), period.truth
 
 
 def _after_a_period(assembly: Assembly, physics: Array, commands: Array, fields: Fields) -> Array:
@@ -205,13 +221,13 @@ def _after_a_period(assembly: Assembly, physics: Array, commands: Array, fields:
 
 
 def _difference(model: Any, nominal: Array, other: Array) -> Array:
-    """Return the other state's error from the nominal one, in the coordinates of ``qvel``."""
+    """Return the other state's error from the nominal one, in the coordinates of the states."""
     data = [mujoco.MjData(model) for _ in range(2)]
     for each, row in zip(data, (nominal, other), strict=True):
         mujoco.mj_setState(model, each, row, INTEGRATION)
     moved = np.zeros(model.nv)
     mujoco.mj_differentiatePos(model, moved, 1.0, data[0].qpos, data[1].qpos)
-    return np.concatenate([moved, data[1].qvel - data[0].qvel])
+    return np.concatenate([moved, data[1].qvel - data[0].qvel, data[1].act - data[0].act])
 
 
 def _refuse_memory(assembly: Assembly) -> None:
@@ -222,59 +238,37 @@ def _refuse_memory(assembly: Assembly) -> None:
                 f"plant: {type(kind).__name__} has states of its own ({remembered}), which a "
                 "linear model of the motion lacks: give a plant whose actuators have none"
             )
-
-
-def _input_steps(assembly: Assembly, fields: Fields) -> Array:
-    """Return the step of each input, (m,)."""
-    limits: dict[str, Array] = {}
-    for kind in assembly.actuators.kinds:
-        for name, (least, largest) in kind.limits().items():
-            limits[name] = np.minimum(-least, largest)
-    steps = [
-        np.where(np.isfinite(limit) & (limit > 0.0), _PART * limit, _PART).ravel()
-        for limit in (np.broadcast_to(limits[name], f.shape) for name, f in fields.items())
-    ]
-    return np.concatenate([np.zeros(0), *steps])
-
-
-def _refuse_bent(nominal: Array, moved: Array, names: list[str]) -> None:
-    """Refuse an input that does not act linearly about zero."""
-    for name, up, down in zip(names, moved[::2] - nominal, moved[1::2] - nominal, strict=True):
-        if np.abs(up + down).max() > _LINEAR * np.abs(up - down).max() + 1e-12:
-            raise InputError(
-                f"command.{name}: does not act linearly about zero, as a thruster that is on or "
-                "off: a linear model has no column for it"
-            )
+    if assembly.vehicle.model.nhistory:
+        raise InputError(
+            "plant.model: its motors act late (nsample, delay), which a linear model of the motion "
+            "lacks: linearize it without"
+        )
 
 
 def _outputs(assembly: Assembly, measurement: Fields) -> Iterator[tuple[str, Field]]:
     """Yield what depends on the motion at the instant alone, of what is measured."""
-    sensors = assembly.scenario.sensors
+    sensors, own = assembly.scenario.sensors, {s.field: s for s in assembly.vehicle.own.sensors}
     for name, field in measurement.items():
-        of_sensor = name in sensors and not sensors[name].integrates
-        if prod(field.shape) and (of_sensor or name in _OF_HINGES):
-            turns = field.measures == "attitude"
+        if name in own:
+            of_motion, turns = not own[name].of_forces, own[name].is_attitude
+        else:
+            of_sensor = name in sensors and not sensors[name].integrates
+            of_motion, turns = of_sensor or name in _OF_HINGES, field.measures == "attitude"
+        if prod(field.shape) and of_motion:
             yield name, field._replace(shape=(3,), unit="rad") if turns else field
 
 
 def _reported(truth: Any, field: Field) -> Array:
     """Return what an ideal sensor reports, (N, k); of an attitude its error from the first."""
-    values: Array = getattr(truth, field.measures)
-    if field.measures != "attitude":
-        return values.reshape(len(values), -1)
+    values: Array = getattr(truth, field.measures).reshape(len(truth.attitude), -1)
+    if prod(field.shape) == values.shape[1]:
+        return values
     error = attitude.multiply(attitude.conjugate(values[0]), values)
     return attitude.to_rotation_vector(error)
 
 
 def _noise(sensor: Any) -> float:
     return 0.0 if sensor is None else float(sensor.noise_std)
-
-
-def _names(fields: Fields) -> Iterator[str]:
-    """Yield the name of each number of the fields, ``inertia[0,1]``."""
-    for name, field in fields.items():
-        for index in np.ndindex(field.shape):
-            yield f"{name}[{','.join(map(str, index))}]" if index else name
 
 
 def _units(fields: Fields) -> Iterator[str]:

@@ -45,7 +45,7 @@ class StateLayout:
         self.measured = {
             quantity: sensor
             for quantity, sensor in kinds.items()
-            if quantity not in ALWAYS and not sensor.integrates
+            if quantity not in (*ALWAYS, "model") and not sensor.integrates
         }
         orbit = assembly.scenario.environment.orbit
         self.orbit = None if orbit is None else orbit.elements()

@@ -21,7 +21,7 @@ from mjspace.validation.passport import Finding
 from mjspace.validation.results import Data
 from mjspace.vehicle import mass_properties, own_model, roles
 from mjspace.vehicle.indices import bus_id
-from mjspace.vehicle.model_sensors import sensors_of
+from mjspace.vehicle.model_sensors import ModelSensor, sensors_of
 from mjspace.vehicle.roles import Motor
 from mjspace.vehicle.vehicle import Vehicle, build, inertials
 
@@ -149,7 +149,7 @@ def inspect(source: ModelSource, table: PlantTable) -> Inspection:
     own_model.name_all(spec)
     own_model.free(spec, table.roles.bus)
     model = own_model.compiled(spec)
-    texts = [*_replaced(model), *model_files.findings(spec)]
+    texts = [*_replaced(model), *_of_sensors(model, spec), *model_files.findings(spec)]
     findings = [Finding(refused=False, text=text) for text in texts]
     vehicle = _vehicle(source, table, model, findings)
     return Inspection(
@@ -199,8 +199,43 @@ def _replaced(model: Any) -> Iterator[str]:
         touching = (model.geom_contype | model.geom_conaffinity).any()
         if touching:
             yield "contacts are switched off, unless it lands on a [plant.ground]"
+    exact = np.flatnonzero(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_FILTEREXACT)
+    if exact.size:
+        names = ", ".join(repr(model.actuator(motor).name) for motor in exact)
+        yield (
+            f"dyntype filterexact of {names} is flown as filter, which is the same lag: MuJoCo's "
+            "RK4 is of first order in the other"
+        )
     if model.nkey:
         yield f"its {model.nkey} keyframes are left out: [initial] says how it begins"
+
+
+def _of_sensors(model: Any, spec: Any) -> Iterator[str]:
+    """Yield what of the model's sensors the scenario replaces."""
+    known = dict(zip(sensors_of(model), spec.sensors, strict=True))
+    noisy = [own for own, sensor in known.items() if sensor.noise]
+    if noisy:
+        yield (
+            f"the noise of {_listed(noisy)} is not flown, as MuJoCo does not use it: with "
+            f'[sensors.{noisy[0].field}] measures = "model", noise_std = {known[noisy[0]].noise:g} '
+            "it is"
+        )
+    sampled = [s for s, each in known.items() if each.nsample or each.delay or any(each.interval)]
+    if sampled:
+        yield (
+            f"delay and interval of {_listed(sampled)} are left out: [sensors.{sampled[0].field}] "
+            'measures = "model" has delay and period'
+        )
+    magnetometers = [own for own in known if own.kind == "magnetometer"]
+    if magnetometers:
+        yield (
+            f"{_listed(magnetometers)} read the model's uniform magnetic field, not that of the "
+            "scenario, which [sensors.magnetic_field] measures"
+        )
+
+
+def _listed(sensors: list[ModelSensor]) -> str:
+    return f"its sensors {', '.join(repr(sensor.name) for sensor in sensors)}"
 
 
 def _body(model: Any, body: int) -> Body:

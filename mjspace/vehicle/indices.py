@@ -25,7 +25,7 @@ def of(model: Any, driven: Driven) -> dict[str, Any]:
         "gimbal_dof": _where(model.joint(name).dofadr for name in driven.gimbals),
         "gimbal_qpos": _where(model.joint(name).qposadr for name in driven.gimbals),
         "strut_qpos": _where(joint.qposadr for joint in _struts(model)),
-        **{name: _sensor(model, name) for name in (MOMENTUM, KINETIC, ENVIRONMENT)},
+        **{name: columns_of(model, name) for name in (MOMENTUM, KINETIC, ENVIRONMENT)},
     }
 
 
@@ -63,7 +63,8 @@ def _where(addresses: Iterable[Any]) -> Any:
     return frozen(np.array([address[0] for address in addresses], dtype=int))
 
 
-def _sensor(model: Any, name: str) -> slice:
+def columns_of(model: Any, name: str) -> slice:
+    """Return where the sensor of that name stands in a row of MuJoCo's sensors."""
     sensor = model.sensor(name)
     return slice(int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))
 

@@ -11,6 +11,7 @@ import numpy as np
 from mjspace.vehicle import stability
 from mjspace.vehicle.stability import Linear, mass_matrix
 
+_RK4_REACHES = 2.785294  # where RK4's stability ends on the negative real axis
 _FEWEST_STEPS = 10.0  # a revolution: RK4's error of the wobble is 1.7e-4 there
 
 
@@ -23,13 +24,14 @@ def check(model: Any) -> None:
 
     Raises:
         ValueError: automatic reset, sleep or armature; gravity, or a damper, spring or friction on
-            a free flyer; a step too long for a servo, spring or damper. The message names all of
-            them, each with its number and its cure.
+            a free flyer; a step too long for a servo, spring, damper or lag. The message names all
+            of them, each with its number and its cure.
 
     Warns:
         ModelWarning: an integrator other than RK4 for bodies on joints, colliding geometry or a
-            fluid on a free flyer, a damper or servo of the wrong sign, constraints that are
-            switched off, or a range that is not enforced.
+            fluid on a free flyer, a damper or servo of the wrong sign, RK4 on a lag that MuJoCo
+            integrates by itself, constraints that are switched off, or a range that is not
+            enforced.
     """
     linear = stability.linearized(model)
     refused = [
@@ -39,6 +41,7 @@ def check(model: Any) -> None:
         *_uniform_gravity(model),
         *_held_free_joint(model),
         *_stiff_joints(model, linear),
+        *_short_lags(model),
     ]
     if refused:
         raise ValueError("\n".join(refused))
@@ -47,6 +50,7 @@ def check(model: Any) -> None:
         *_collisions(model),
         *_fluid(model),
         *_driven_joints(model, linear),
+        *_inexact_lags(model),
         *_ignored_constraints(model),
         *_ignored_ranges(model),
     ):
@@ -160,6 +164,42 @@ def _driven_joints(model: Any, linear: Linear | None) -> Iterator[str]:
             f"{_joint_name(model, dof)} has damping {slopes[dof]:.4g}: a damper or servo with "
             f"the wrong sign accelerates it without bound"
         )
+
+
+def _short_lags(model: Any) -> Iterator[str]:
+    """Yield the motors with a first-order lag that RK4 makes grow."""
+    step = model.opt.timestep
+    for motor in _lagging(model, mujoco.mjtDyn.mjDYN_FILTER):
+        lag = model.actuator_dynprm[motor, 0]
+        if step > _RK4_REACHES * lag:
+            yield (
+                f"actuator {model.actuator(motor).name!r} lags by {lag:g} s: RK4 makes its "
+                f"activation grow at a step of {step:g} s; use one below {_RK4_REACHES * lag:.2g} s"
+            )
+
+
+def _inexact_lags(model: Any) -> Iterator[str]:
+    """Yield the motors whose lag is not what they say.
+
+    MuJoCo 4.0 applies the analytic integral of a step, 1 - exp(-x) with x = step / lag, to the mean
+    slope of RK4's stages, which is 1 - x/2 + x^2/6 - x^3/24 of that at the step's start.
+    """
+    for motor in _lagging(model, mujoco.mjtDyn.mjDYN_FILTEREXACT):
+        lag = max(float(model.actuator_dynprm[motor, 0]), mujoco.mjMINVAL)
+        x = model.opt.timestep / lag
+        kept = 1.0 + np.expm1(-x) * (1.0 - x / 2.0 + x**2 / 6.0 - x**3 / 24.0)
+        becomes = f"{-model.opt.timestep / np.log(kept):.4g} s" if 0.0 < kept < 1.0 else "unstable"
+        yield (
+            f"actuator {model.actuator(motor).name!r} has dyntype filterexact: its lag of {lag:g} "
+            f's becomes {becomes} with RK4; use dyntype="filter"'
+        )
+
+
+def _lagging(model: Any, kind: Any) -> Any:
+    """Return the motors with that kind of lag which RK4 integrates."""
+    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
+        return []
+    return np.flatnonzero(model.actuator_dyntype == kind)
 
 
 def _integrator(model: Any) -> Iterator[str]:

@@ -1,25 +1,40 @@
-"""The sensors of a user's own model, as it has them at each control instant."""
+"""The sensors that a user's own model has."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import mujoco
-import numpy as np
 
-from mjspace.contract import Array, Event, Measurement
-from mjspace.vehicle.step_effect import State, StepEffect
+from mjspace.contract import Measurement
 
 _OF_FORCES = int(mujoco.mjtStage.mjSTAGE_ACC)
-PREFIX = "model_sensor_"
+_HINGE = mujoco.mjtJoint.mjJNT_HINGE
+_KIND = mujoco.mjtSensor
+CARRIES = ("force", "torque")
+"""Kinds of sensors that feel what is carried through them."""
+FEELS_GRAVITY = ("accelerometer", "framelinacc", *CARRIES)
+"""Kinds of sensors into which MuJoCo counts its gravity."""
+PLACE, AXES, CENTRE = ":place", ":axes", ":centre"
+"""Endings of the names of what tells of such a sensor where it is (3), its quaternion (4) and the
+centre of mass of what it carries (3), in inertial axes."""
 _UNITS = {
     **dict.fromkeys(("gyro", "frameangvel", "ballangvel"), "rad/s"),
     **dict.fromkeys(("velocimeter", "framelinvel", "subtreelinvel", "tendonvel"), "m/s"),
     **dict.fromkeys(("framepos", "subtreecom", "rangefinder", "tendonpos"), "m"),
+    **dict.fromkeys(("accelerometer", "framelinacc"), "m/s^2"),
+    **dict.fromkeys(("touch", "force", "tendonactfrc", "tendonlimitfrc"), "N"),
+    "frameangacc": "rad/s^2",
+    "torque": "N m",
     "subtreeangmom": "N m s",
     "clock": "s",
 }
+_OF_JOINTS = {
+    "jointpos": ("rad", "m"),
+    "jointvel": ("rad/s", "m/s"),
+    "jointactfrc": ("N m", "N"),
+    "jointlimitfrc": ("N m", "N"),
+}
+"""Units where the joint is a hinge, and where it is a slide."""
 
 
 class ModelSensor(NamedTuple):
@@ -35,8 +50,13 @@ class ModelSensor(NamedTuple):
     """How many numbers it reports."""
     unit: str
     """Of what it reports; "" for numbers, and where MuJoCo leaves it open."""
-    measured: bool
-    """Whether a law receives it: not, where it depends on forces, as an accelerometer does."""
+    of_forces: bool
+    """Whether it depends on forces, as an accelerometer does."""
+
+    @property
+    def is_attitude(self) -> bool:
+        """Whether it reports a quaternion."""
+        return self.kind in ("framequat", "ballquat")
 
 
 def sensors_of(model: Any) -> tuple[ModelSensor, ...]:
@@ -48,68 +68,34 @@ def sensors_of(model: Any) -> tuple[ModelSensor, ...]:
         plain = re.sub(r"\W|^(?=\d)", "_", name)
         plain = f"model_{plain}" if plain in taken or plain.startswith("_") else plain
         taken.add(plain)
-        kind = mujoco.mjtSensor(model.sensor_type[i]).name.removeprefix("mjSENS_").lower()
-        size, measured = int(model.sensor_dim[i]), bool(model.sensor_needstage[i] < _OF_FORCES)
-        found.append(ModelSensor(name, plain, kind, size, _unit(model, i, kind), measured))
+        kind = _named(model.sensor_type[i])
+        size, of_forces = int(model.sensor_dim[i]), model.sensor_needstage[i] == _OF_FORCES
+        found.append(ModelSensor(name, plain, kind, size, _unit(model, i, kind), bool(of_forces)))
     return tuple(found)
 
 
 def _unit(model: Any, sensor: int, kind: str) -> str:
-    if kind not in ("jointpos", "jointvel"):
+    if kind not in _OF_JOINTS:
         return _UNITS.get(kind, "")
-    hinge = model.jnt_type[model.sensor_objid[sensor]] == mujoco.mjtJoint.mjJNT_HINGE
-    return ("rad" if hinge else "m") + ("/s" if kind == "jointvel" else "")
+    of_hinge, of_slide = _OF_JOINTS[kind]
+    return of_hinge if model.jnt_type[model.sensor_objid[sensor]] == _HINGE else of_slide
 
 
-@dataclass(eq=False)
-class ModelSensors(StepEffect):
-    """Reads them at each control instant into the truth, which then has a field for each."""
+def add_places(spec: Any) -> None:
+    """Add to a model with named sensors what tells where those are that feel gravity."""
+    for sensor in list(spec.sensors):
+        kind = _named(sensor.type)
+        if kind not in FEELS_GRAVITY:
+            continue
+        name, where = sensor.name, {"objtype": sensor.objtype, "objname": sensor.objname}
+        spec.add_sensor(name=name + PLACE, type=_KIND.mjSENS_FRAMEPOS, **where)
+        spec.add_sensor(name=name + AXES, type=_KIND.mjSENS_FRAMEQUAT, **where)
+        if kind in CARRIES:
+            carried = spec.site(sensor.objname).parent.name
+            body = {"objtype": mujoco.mjtObj.mjOBJ_BODY, "objname": carried}
+            spec.add_sensor(name=name + CENTRE, type=_KIND.mjSENS_SUBTREECOM, **body)
 
-    name: ClassVar[str] = "the model's own sensors"
-    not_compiled = ""
-    looks: ClassVar[bool] = True
 
-    model: Any
-    columns: dict[str, slice]
-    """Of ``sensordata``, by the field."""
-    _batch: Any = field(init=False, repr=False, default=None)
-    _sensordata: Any = field(init=False, repr=False, default=None)
-
-    @classmethod
-    def of(cls, model: Any, sensors: Sequence[ModelSensor]) -> Self | None:
-        """Return the effect for the measured ones of the ``sensors``; None without any."""
-        columns = {}
-        for sensor in sensors:
-            if sensor.measured:
-                first = int(model.sensor(sensor.name).adr[0])
-                columns[sensor.field] = slice(first, first + sensor.size)
-        return cls(model, columns) if columns else None
-
-    def bind(self, batch: Any) -> None:
-        """Take the batch and its sensors."""
-        self._batch, self._sensordata = batch, batch.bind("sensordata")
-
-    def reset(self, physics: Array) -> State:
-        """Return what they read at ``physics`` (N, nstate)."""
-        data = mujoco.MjData(self.model)
-        read = []
-        for row in physics:
-            mujoco.mj_setState(self.model, data, row, mujoco.mjtState.mjSTATE_INTEGRATION)
-            mujoco.mj_step1(self.model, data)
-            read.append(data.sensordata.copy())
-        return self.look({}, physics, np.array(read))[0]
-
-    def observe(self, memory: State, physics: Array, time: float, events: list[Event]) -> State:
-        """Return the memory with what they read at a control instant."""
-        # At stage POS alone, MuJoCo 4.0 computes no kinetic energy in the step that follows.
-        self._batch.forward(stage=mujoco.mjtStage.mjSTAGE_VEL)
-        return self.look(memory, physics, self._sensordata.copy())[0]
-
-    def look(self, memory: State, physics: Array, sensordata: Array) -> tuple[State, Array]:
-        """Return the memory with what they read now; there is no event."""
-        read = {f"{PREFIX}{name}": sensordata[:, part] for name, part in self.columns.items()}
-        return memory | read, np.zeros((len(physics), 1), bool)
-
-    def add_to_truth(self, memory: State, truth: Measurement) -> Measurement:
-        """Return the truth with a field for each sensor."""
-        return truth._replace(**{name: memory[f"{PREFIX}{name}"] for name in self.columns})
+def _named(kind: Any) -> str:
+    name: str = _KIND(kind).name
+    return name.removeprefix("mjSENS_").lower()

@@ -14,6 +14,7 @@ from mjspace.errors import nearest
 from mjspace.scenario.model_source import KINDS, ModelSource, read_source, source_of
 from mjspace.scenario.plant import Roles
 from mjspace.scenario.trust import Trust
+from mjspace.vehicle import model_sensors
 from mjspace.vehicle import roles as recognition
 from mjspace.vehicle.roles import Recognized
 
@@ -32,7 +33,8 @@ def open_source(model: str, trust: Trust) -> ModelSource:
     place, is_code, _ = model.partition(":")
     if place.endswith(".mjb"):
         raise ValueError(
-            f"{model} is compiled, and nothing can be added to it: give the MJCF it was made of"
+            f"{model} is compiled, and nothing can be added to it: give the MJCF it was made of, "
+            "as mj_saveLastXML writes it"
         )
     if not is_code:
         return read_source(model, trust)
@@ -121,15 +123,21 @@ def prepare(
     _set_options(spec, lands=lands)
     for key in list(spec.keys):
         spec.delete(key)
+    for motor in spec.actuators:
+        if motor.dyntype == mujoco.mjtDyn.mjDYN_FILTEREXACT:
+            motor.dyntype = mujoco.mjtDyn.mjDYN_FILTER  # the same lag, to RK4's order
+    for sensor in spec.sensors:  # a scenario says how one samples
+        sensor.nsample, sensor.delay, sensor.interval = 0, 0.0, np.zeros(2)
     model = compiled(spec)
     recognized = recognition.recognize(model, roles)
+    model_sensors.add_places(spec)
     for motor in (*recognized.wheels, *recognized.thrusters):
         number = model.actuator(motor.name).id
         _command_in_si(spec.actuator(motor.name), recognition.scale(model, number))
     if _is_constrained(model):
         # At its tolerance the solver would leave a remainder between a torque and its reaction.
         spec.option.tolerance = 0.0
-    else:
+    elif not lands:
         spec.option.disableflags |= int(_DISABLE.mjDSBL_CONSTRAINT)
     return recognized, model
 

@@ -50,5 +50,5 @@ def add_sensors(
                 reftype=reference,
                 refname=seen_from,
             )
-            added.append(ModelSensor(plain, plain, sensor, size, unit, measured=True))
+            added.append(ModelSensor(plain, plain, sensor, size, unit, of_forces=False))
     return tuple(added)

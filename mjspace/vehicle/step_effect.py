@@ -81,6 +81,8 @@ class StepEffect(ABC):
     looks: ClassVar[bool] = False
     """Whether it has a ``look``, at each control instant and, if it acts in them, each integration
     step."""
+    of_forces: bool = False
+    """Whether what it looks at at control instants depends on forces, which are then evaluated."""
     waits: bool = False
     """Whether it has an ``alarm``, at each control instant."""
     fields: ClassVar[tuple[str, ...]] = ()

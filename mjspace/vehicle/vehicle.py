@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.errors import input_error_at
+from mjspace.errors import input_error_at, nearest
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.model_source import ModelSource
 from mjspace.scenario.plant import Initial, PlantTable, Rates
@@ -192,15 +192,16 @@ def _padded(limits: Array, count: int) -> Array:
 
 
 def _set_joints(model: Any, data: Any, initial: Initial) -> None:
-    free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
-    known = {model.joint(i).name: i for i in np.flatnonzero(~free)}
-    for name in (*initial.joint_position, *initial.joint_speed):
-        if name not in known:
-            raise ValueError(f"initial: no joint {name!r} among the parts: have {', '.join(known)}")
-    for name, value in initial.joint_position.items():
-        data.qpos[model.jnt_qposadr[known[name]]] = value
-    for name, value in initial.joint_speed.items():
-        data.qvel[model.jnt_dofadr[known[name]]] = value
+    simple = np.isin(model.jnt_type, [mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE])
+    known = {model.joint(i).name: i for i in np.flatnonzero(simple)}
+    for key, values, to, places in (
+        ("joint_position", initial.joint_position, data.qpos, model.jnt_qposadr),
+        ("joint_speed", initial.joint_speed, data.qvel, model.jnt_dofadr),
+    ):
+        for name, value in values.items():
+            if name not in known:
+                raise ValueError(f"initial.{key}: no hinge or slide {name!r}{nearest(name, known)}")
+            to[places[known[name]]] = value
 
 
 def to_mjb(model: Any) -> bytes:

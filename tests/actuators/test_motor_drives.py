@@ -148,7 +148,7 @@ def test_a_motor_without_a_drive_is_refused() -> None:
             "plant.drives.cmg_door: no motor turns it: have cmg_outer, cmg_inner, cmg_wheel",
         ),
         ("dgvscmg-tracking", "plant.ripple.door={amplitude=1, cycles=1}", "no hinge 'door'"),
-        ("dgvscmg-tracking", "initial.joint_speed.door=1", "no joint 'door' among the parts"),
+        ("dgvscmg-tracking", "initial.joint_speed.door=1", "no hinge or slide 'door'"),
         ("dgvscmg-tracking", "initial.wheel_speed=[1, 2]", "2 speeds for 1 wheels"),
         ("dgvscmg-tracking", "law.current_gain=9e6", "control period of 0.0001 s is too long"),
     ],

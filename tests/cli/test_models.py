@@ -101,6 +101,23 @@ def test_inspect_notes_what_the_compiler_changes(mjspace: Command) -> None:
     assert "note: settotalmass=20: the total mass is 20 kg instead of 9.1 kg" in shown.out
 
 
+def test_inspect_says_what_of_the_sensors_is_not_flown(mjspace: Command) -> None:
+    text = SENSED.replace(
+        'name="imu_rate"', 'name="imu-rate" noise="0.01" nsample="2" delay="0.01"'
+    )
+    Path("craft.xml").write_text(text.replace("<sensor>", '<sensor><magnetometer site="imu"/>'))
+    shown = mjspace("inspect", "craft.xml")
+    assert shown.status == 0
+    for note in (
+        "note: the noise of its sensors 'imu-rate' is not flown, as MuJoCo does not use it: with "
+        '[sensors.imu_rate] measures = "model", noise_std = 0.01 it is',
+        "note: delay and interval of its sensors 'imu-rate' are left out: [sensors.imu_rate] "
+        'measures = "model" has delay and period',
+        "note: its sensors 'imu_sensor' read the model's uniform magnetic field, not that of the",
+    ):
+        assert note in shown.out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

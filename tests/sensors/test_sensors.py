@@ -555,7 +555,7 @@ def test_a_measurement_is_what_it_was_made_of() -> None:
         ({"st": {}}, "no sensor measures 'st'"),
         ({"st": {"measures": "attitud"}}, "no sensor measures 'attitud': did you mean 'attitude'"),
         ({"st": 3}, "got 3, should be a table"),
-        ({"St": {"measures": "rate"}}, "String should match pattern"),
+        ({"s t": {"measures": "rate"}}, "String should match pattern"),
         ({"rate": {"noise": 1.0}}, "noise is now noise_std: the standard deviation"),
         ({"rate": {"bias": 1.0, "noise": 0}}, "noise is now noise_std and bias is now bias_std"),
     ],

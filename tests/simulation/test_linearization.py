@@ -8,6 +8,7 @@ import pytest
 from command_lines import command_line
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_models import SENSED, write
 from scipy.linalg import expm
 
 import mjspace
@@ -213,6 +214,105 @@ def test_hinges_and_wheels_have_their_names() -> None:
     assert [units[name] for name in others] == ["rad", "rad/s"]
 
 
+LAGGING = SENSED.replace(
+    '<motor joint="rw3"/>',
+    '<general name="slow" joint="rw3" dyntype="filterexact" dynprm="0.2" gainprm="0.05"/>',
+)
+"""A model of one's own in which a motor lags behind its command by 0.2 s."""
+
+
+def test_a_motor_of_ones_own_lags_by_its_activation(tmp_path: Path) -> None:
+    plant = mjspace.linearize(write(tmp_path, LAGGING), ["initial.rate=[0, 0, 0]"])
+    states, inputs = list(plant.states), list(plant.inputs)
+    slow, column = states.index("slow.activation"), inputs.index("control[1]")
+    assert plant.A[slow, slow] == pytest.approx(-5.0, rel=1e-9)
+    assert plant.B[slow, column] == pytest.approx(5.0, rel=1e-9)
+    assert np.count_nonzero(np.abs(plant.A[slow]) > 1e-9) == 1
+    # At once the command turns nothing; the activation does, as a torque of 0.05 N m for each unit.
+    rates = [states.index(f"rate[{i}]") for i in range(3)]
+    wheel = states.index("gimbal_rate[1]")  # a hinge that no wheel's motor turns
+    np.testing.assert_allclose(plant.B[[*rates, wheel], column], 0.0, atol=1e-12)
+    axial = 0.5 * 0.2 * 0.03**2
+    turned = plant.A[wheel, slow] + plant.A[rates[2], slow]
+    assert turned == pytest.approx(0.05 / axial, rel=1e-6)
+    n, m = plant.B.shape
+    both = np.zeros((n + m, n + m))
+    both[:n] = np.hstack([plant.A, plant.B])
+    held = expm(both * plant.control_period)
+    # RK4 in steps of 4 ms, with a servo.
+    np.testing.assert_allclose(held[:n, :n], plant.Ad, atol=1e-5 * np.abs(plant.Ad).max())
+    np.testing.assert_allclose(held[:n, n:], plant.Bd, atol=1e-5 * np.abs(plant.Bd).max())
+
+
+JET = """
+<mujoco>
+  <worldbody>
+    <body name="bus">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="10" diaginertia="1 2 2.5"/>
+      <site name="jet" pos="0 0.2 -0.1"/>
+    </body>
+  </worldbody>
+  <actuator>
+    <general name="jet" site="jet" gear="0 0 2 0 0 0" ctrlrange="0 1"/>
+    <general name="back" site="jet" gear="1 0 0 0 0 0" ctrlrange="-3 0"/>
+  </actuator>
+</mujoco>
+"""
+
+
+def test_a_thruster_that_only_pushes_has_its_slope_to_that_side(tmp_path: Path) -> None:
+    plant = mjspace.linearize(write(tmp_path, JET), ["initial.rate=[0, 0, 0]"])
+    np.testing.assert_array_equal([plant.input_least, plant.input_largest], [[0, -3], [2, 0]])
+    force = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]).T
+    turning = np.cross([0.0, 0.2, -0.1], force.T).T / np.array([[1.0], [2.0], [2.5]])
+    of_velocity = block(plant, "B", "velocity", "thruster_force")
+    np.testing.assert_allclose(of_velocity, force / 10.0, atol=1e-12)
+    of_rate = block(plant, "B", "rate", "thruster_force")
+    np.testing.assert_allclose(of_rate, turning, atol=1e-12)
+    np.testing.assert_allclose(plant.Bd[9:], 0.02 * turning, atol=1e-9)  # a control period of 20 ms
+    assert not plant.A[6:].any()  # no thrust is in what the states do
+
+
+def test_the_outputs_of_ones_own_sensors_are_those_of_motion(tmp_path: Path) -> None:
+    noisy = "sensors.star_tracker={measures='model',noise_std='0.1 deg'}"
+    plant = mjspace.linearize(write(tmp_path), ["initial.rate=[0, 0, 0]", noisy])
+    turn = np.radians(30.0)
+    c, s = np.cos(turn), np.sin(turn)
+    into = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(block(plant, "C", "imu_rate", "rate"), into, atol=1e-9)
+    np.testing.assert_allclose(block(plant, "C", "star_tracker", "attitude"), into, atol=1e-9)
+    np.testing.assert_allclose(block(plant, "C", "elbow_angle", "gimbal_angle"), [[1.0]], atol=1e-9)
+    assert not any(name.startswith("acceleration") for name in plant.outputs)
+    noise = dict(zip(plant.outputs, plant.noise_std, strict=True))
+    assert noise["star_tracker[1]"] == pytest.approx(np.radians(0.1))
+    assert plant.C.shape == (len(plant.outputs), len(plant.states))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            ('ctrlrange="0 1"', 'ctrlrange="0.2 1"'),
+            r"command\.thruster_force\[0\]: zero is not within its range, from 0\.4 to 2",
+        ),
+        (
+            ('<motor joint="rw3"/>', '<muscle name="m" joint="rw3" lengthrange="0 1" force="1"/>'),
+            r"(m\.activation|command\.control\[1\]): does not act linearly about zero",
+        ),
+        (
+            ('<motor joint="rw3"/>', '<motor joint="rw3" nsample="5" delay="0.01"/>'),
+            r"plant\.model: its motors act late",
+        ),
+    ],
+)
+def test_motors_of_ones_own_that_have_no_linear_model(
+    change: tuple[str, str], said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=said):
+        mjspace.linearize(write(tmp_path, SENSED.replace(*change)))
+
+
 @pytest.mark.parametrize(
     ("scenario", "said"),
     [
@@ -235,9 +335,10 @@ def test_what_has_no_linear_model_is_refused(
 def test_the_file_holds_it_all(rigid: Path, tmp_path: Path) -> None:
     path = tmp_path / "plant.npz"
     assert command_line("linearize", str(rigid), "--out", str(path)) == 0
-    plant, read = mjspace.linearize(rigid), np.load(path)  # without pickles
-    assert set(read.files) == set(vars(plant))
-    for name in read.files:
-        np.testing.assert_array_equal(read[name], getattr(plant, name))
+    plant = mjspace.linearize(rigid)
+    with np.load(path) as read:  # without pickles
+        assert set(read.files) == set(vars(plant))
+        for name in read.files:
+            np.testing.assert_array_equal(read[name], getattr(plant, name))
     with pytest.raises(OSError, match="No such file"):
         plant.save(tmp_path / "none" / "plant.npz")

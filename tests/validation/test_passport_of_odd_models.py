@@ -62,18 +62,20 @@ def test_dry_friction_is_judged_but_for_order_and_step(tmp_path: Path) -> None:
     assert "keeps the attitude within" in found.advice[-1]
 
 
-def test_a_lax_constraint_solver_acts_as_if_from_outside(tmp_path: Path) -> None:
+def test_a_lax_constraint_solver_is_told_and_not_flown(tmp_path: Path) -> None:
     small = '<inertial pos="0 0 0" mass="0.2" diaginertia="2e-5 2e-5 3.3e-5"/>'
     bus = BODY.replace("1 1.2 1.5", "0.2 0.22 0.25")
     case = {"joint": 'frictionloss="0.0005"', "rotor": small, "bus": bus, "step": "0.002"}
     found = issued(tmp_path, **case)
-    assert not found.passed
+    assert found.passed
+    assert drift(found) < 1e-12
+    told = found.advice[0]
+    assert told.startswith("the constraint solver's tolerance is 0 here, as in a scenario's flight")
     # 3e-5 measured: a rest of the bearing's torque that nothing takes up
-    assert drift(found) > 100 * CONSERVED
-    assert found.advice[0].startswith("the constraint solver stops at a tolerance of 1e-08")
+    assert float(told.split("drifts by ")[1].split(" instead")[0]) > 100 * CONSERVED
     exact = issued(tmp_path, option='tolerance="0"', **case)
-    assert drift(exact) < 1e-12
-    assert f"drifts by {drift(exact):.2g} instead of {drift(found):.2g}" in found.advice[0]
+    assert drift(exact) == drift(found)
+    assert not exact.advice[0].startswith("the constraint solver")
 
 
 @pytest.mark.parametrize("beyond", ["", "80"])
@@ -85,6 +87,20 @@ def test_stops_count_where_they_are_reached(tmp_path: Path, beyond: str) -> None
     assert ("energy" in quantities(found)) == bool(beyond)
     assert found.rows[-1].measured == pytest.approx(4.0, abs=0.1)
     assert drift(found) < CONSERVED
+
+
+def test_a_stop_that_is_hit_is_no_fault_of_the_model(tmp_path: Path) -> None:
+    """Panels of unlike stops, one a hair beyond its own: thrown back in the first steps."""
+    panel = """<body name="{name}" pos="{x} 0 -1"><joint name="{name}" axis="0 {y} 0" range="0 90"/>
+      <geom type="box" pos="0 0 1" size="0.05 1 1"/></body>"""
+    tree = f"""<worldbody><body name="hub"><freejoint/>
+      <geom type="box" size="1 1 1" density="200"/>{panel.format(name="p", x=1, y=1)}
+      {panel.format(name="n", x=-1, y=-1)}</body></worldbody>"""
+    key = '<keyframe><key qpos="0 0 0 1 0 0 0 1.571 1.571"/></keyframe>'
+    found = issued(tmp_path, tree=tree, tail=key, step="0.002")
+    assert found.passed
+    assert drift(found) > 1e-9  # 8e-9: in a step with an impact RK4 has no order
+    assert "or of the steps in which a stop is hit" in found.rows[0].reason
 
 
 def test_no_step_is_told_from_errors_that_do_not_fall_as_rk4s(tmp_path: Path) -> None:
@@ -115,6 +131,7 @@ def test_a_soft_weld_is_no_rigid_one(tmp_path: Path) -> None:
     assert "energy: that of soft constraints (equality 'dock')" in found.unjudged[0]
     assert "order and step with soft constraints (equality 'dock')" in found.unjudged[1]
     assert quantities(found) == ["angular momentum", "centre of mass"]
+    assert found.passed  # both begin as one: apart, they would turn 5e-5 of their momentum around
     assert found.advice == []
 
 

@@ -90,9 +90,8 @@ def _measured(assembly: Assembly) -> dict[str, Field]:
             quantity,
         )
     for own in assembly.vehicle.sensors:
-        if own.measured:
-            about_it = f"The model's own sensor {own.name}, MuJoCo's {own.kind}"
-            found[own.field] = Field((own.size,), own.unit, about_it, own.field)
+        about_it = f"The model's own sensor {own.name}, MuJoCo's {own.kind}"
+        found[own.field] = Field((own.size,), own.unit, about_it, own.field)
     return found
 
 
