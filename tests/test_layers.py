@@ -37,7 +37,7 @@ ROOMS = {
     "scenario": "contract errors ranges units",
     "tracing": "gufunc",
     "vehicle": "contract errors scenario",
-    "environment": "contract scenario vehicle",
+    "environment": "contract errors scenario vehicle",
     "sensors": "attitude contract errors gufunc scenario units",
     "actuators": ("contract environment errors gufunc scenario sensors signals units vehicle"),
     "log": "attitude contract errors scenario units",

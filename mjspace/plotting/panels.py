@@ -16,6 +16,8 @@ DECLARED = topics.units()
 NO_UNIT = Unit("")
 DESIRED_RATE = "/reference", "rate"
 LAW_PANELS = 4
+_CLOSED = "_closed"
+"""Ending of the field that tells whether a connection is closed."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def curves(log: Log) -> list[Curves]:
     """
     standard = [
         panel
-        for panel in STANDARD
+        for panel in (*STANDARD, *_of_connections(log))
         if log.topics.get(panel.topic, {}).get(panel.field, (0,)) != (0,)
     ]
     law = [_of_signal(log, f"law.{field}") for field in log.topics.get("/law", {})]
@@ -88,6 +90,20 @@ def curves(log: Log) -> list[Curves]:
     shown = [one for one in found[: len(standard)] if one.value.any()]
     changing = [one for one in found[len(standard) :] if np.ptp(one.value, axis=0).any()]
     return [*shown, *changing[:LAW_PANELS]]
+
+
+def _of_connections(log: Log) -> list[Panel]:
+    """Return the panels of where the vehicle's port is at each connection of spacecraft."""
+    names = [
+        name.removesuffix(_CLOSED)
+        for name in log.topics.get("/truth", {})
+        if name.endswith(_CLOSED)
+    ]
+    return [
+        Panel(f"Port of {name}, {what}", "/truth", f"{name}_{what}", names="xyz")
+        for name in names
+        for what in ("position", "velocity")
+    ]
 
 
 def chosen(log: Log, signals: Sequence[str]) -> list[Curves]:

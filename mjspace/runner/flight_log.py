@@ -31,13 +31,15 @@ def units_of(assembly: Assembly, kinds: Mapping[str, type] = {}) -> dict[str, di
     units = topics.units(kinds)
     for topic, declared in assembly.actuators.units.items():
         units[topic] |= {name: Unit(unit) for name, unit in declared.items()}
+    of_model = {own.field: Unit(own.unit) for own in assembly.vehicle.sensors if own.unit}
+    units["/measurement"] |= of_model
+    units["/truth"] |= of_model
     for name, sensor in assembly.scenario.sensors.items():
-        if sensor.unit:
-            units["/measurement"].setdefault(name, Unit(sensor.unit))
-            units["/truth"].setdefault(sensor.measures, Unit(sensor.unit))
-    for own in assembly.vehicle.sensors:
-        if own.unit:
-            units["/measurement"][own.field] = units["/truth"][own.field] = Unit(own.unit)
+        quantity = sensor.quantity(name)
+        unit = of_model.get(quantity) or (Unit(sensor.unit) if sensor.unit else None)
+        if unit is not None:
+            units["/measurement"].setdefault(name, unit)
+            units["/truth"].setdefault(quantity, unit)
     return units
 
 

@@ -56,7 +56,10 @@ def test_they_are_compiled_as_in_python(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ("imu={measures='model'}", r"sensors\.imu: the model has no sensor .imu.: did you mean 'im"),
+        (
+            "imu={measures='model'}",
+            r"sensors\.imu: the model has no sensor .imu.: did you mean 'im",
+        ),
         (
             "imu_rate={measures='model',noise_std='1 m/s'}",
             r"sensors\.imu_rate\.noise_std: got 1 m/s, should be in rad/s",
@@ -73,5 +76,7 @@ def test_what_cannot_be_is_one_line(table: str, message: str, tmp_path: Path) ->
 
 
 def test_a_vehicle_of_our_parts_has_none(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"sensors\.gyro: the model has no sensor .gyro.: have none"):
+    with pytest.raises(
+        InputError, match=r"sensors\.gyro: the model has no sensor .gyro.: have none"
+    ):
         run("detumble-wheels", out=tmp_path, overrides=["sensors.gyro={measures='model'}"])

@@ -139,7 +139,10 @@ PORT = "plant.ports.q={}"
             [TARGET + PORTS, PORT, CONNECTED.replace("'q'", "'g'")],
             "connections.c: between: no port 'g'",
         ),
-        ([f"{TARGET}{PORTS}", "initial.joint_position={target=1}"], "initial: no joint 'target'"),
+        (
+            [f"{TARGET}{PORTS}", "initial.joint_position={target=1}"],
+            "initial.joint_position: no hinge or slide 'target'",
+        ),
         (
             ["plant.connections.c={between=['a','b'],springs={stiffness=1,stroke=1}}"],
             "springs: they push once the connection opens: give opens_at",

@@ -78,11 +78,13 @@ def _measured(assembly: Assembly) -> dict[str, Field]:
     measurement = Stepper(assembly, first_start(assembly, [0])).sense(0).measurement
     units, about = units_of(Measurement), docstrings(Measurement)
     of_actuators = assembly.actuators.units["/measurement"]
+    of_model = {own.field: own.unit for own in assembly.vehicle.sensors}
     found = {}
     for name in dict.fromkeys([*assembly.scenario.sensors, *REPORTED_BY_PLANT]):
         sensor = assembly.scenario.sensors.get(name)
-        quantity = name if sensor is None else sensor.measures
+        quantity = name if sensor is None else sensor.quantity(name)
         unit = of_actuators.get(name, "") if sensor is None else sensor.unit
+        unit = of_model.get(quantity, unit)
         found[name] = Field(
             getattr(measurement, name).shape[1:],
             units[quantity].si if quantity in units else unit,
@@ -90,6 +92,8 @@ def _measured(assembly: Assembly) -> dict[str, Field]:
             quantity,
         )
     for own in assembly.vehicle.sensors:
+        if own.field not in measurement._fields or own.field in found:
+            continue  # a sensor of the scenario reports it
         about_it = f"The model's own sensor {own.name}, MuJoCo's {own.kind}"
         found[own.field] = Field((own.size,), own.unit, about_it, own.field)
     return found
