@@ -215,6 +215,17 @@ def without_law(scenario: Scenario, folder: Path, *, trust: bool = False) -> Ass
     return replace(assembly, sources=sources)
 
 
+def under_inner_loop(assembly: Assembly) -> Assembly:
+    """Return the assembly with actuators that an inner loop commands in every integration step.
+
+    Raises:
+        InputError: an actuator cannot be built so.
+    """
+    scenario = assembly.scenario
+    actuators = _part("plant", _actuators, assembly.vehicle, scenario, inner=True)
+    return replace(assembly, actuators=actuators, inner=True)
+
+
 def facts_of(vehicle: Vehicle, scenario: Scenario) -> dict[str, Any]:
     """Return the vehicle's properties, and the periods [s], that a law may take from them."""
     facts = {

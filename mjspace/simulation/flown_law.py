@@ -111,6 +111,8 @@ class FlownLaw:
         """
         try:
             returned = self._law.inner(self.state, time, command, measurement)
+        except ReturnError:
+            raise
         except BaseException as error:
             raise failure("the law's inner loop", error) from error
         check_inner(returned)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mjspace.contract import DesiredMotion, Law, Measurement
-from mjspace.simulation.user_code import ReturnError, check_state, check_step
+from mjspace.simulation.user_code import ReturnError, check_inner, check_state, check_step
 
 
 class UnbatchedLaw:
@@ -38,6 +38,19 @@ class UnbatchedLaw:
             ]
         )
 
+    def inner(
+        self, state: Any, time: float, command: Any, measurement: Measurement
+    ) -> tuple[Any, Any]:
+        """Return the law's state and the motors' command with a vehicle axis."""
+        law: Any = self.law
+        returned = []
+        for vehicle in range(len(measurement.rate)):
+            own, desired = _row(state, vehicle), _row(command, vehicle)
+            returned.append(law.inner(own, time, desired, _of_vehicle(measurement, vehicle)))
+            check_inner(returned[-1])
+        states, commands = zip(*returned, strict=True)
+        return _stack("state", states), _stack("command", commands)
+
     def step_of_one(
         self, state: Any, time: Any, measurement: Measurement, reference: DesiredMotion
     ) -> tuple[Any, Any, Any]:
@@ -50,7 +63,7 @@ class UnbatchedLaw:
         self, vehicle: int, state: Any, time: Any, measurement: Measurement, reference: Any
     ) -> tuple[Any, Any, Any]:
         """Return what the law returns for that vehicle."""
-        own = type(state)(*(field[vehicle] for field in state)) if state else state
+        own = _row(state, vehicle)
         returned = self.law.step(own, time, _of_vehicle(measurement, vehicle), reference)
         check_step(returned)
         return returned
@@ -64,6 +77,11 @@ def stacked(returned: Sequence[tuple[Any, Any, Any]]) -> tuple[Any, Any, Any]:
     """
     state, command, signals = zip(*returned, strict=True)
     return _stack("state", state), _stack("command", command), _stack("signals", signals)
+
+
+def _row(arrays: Any, vehicle: int) -> Any:
+    """Return a vehicle's part of a named tuple, or nothing."""
+    return type(arrays)(*(array[vehicle] for array in arrays)) if arrays else arrays
 
 
 def _of_vehicle(measurement: Measurement, vehicle: int) -> Measurement:

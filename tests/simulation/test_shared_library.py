@@ -163,6 +163,62 @@ int attitude_law("""
     np.testing.assert_array_equal(log.read("/state")["law_integral"][0], first[:3])
 
 
+INNER = """
+int attitude_law_inner(const mjspace_input *in, mjspace_state *state, mjspace_command *command) {
+  for (int i = 0; i < 3; i++) {
+    command->torque[i] -= in->gains.rate_gain * in->measurement.rate[i];
+    state->integral[i] += 0.01 * in->measurement.rate[i];
+  }
+  return STATUS;
+}
+"""
+INNER_IN_PYTHON = (
+    IN_PYTHON.replace("    def reset", "    batched = True\n    def reset", 1)
+    .replace("np.zeros(3)", "np.zeros_like(measurement.rate)")
+    .replace("e[0] < 0.0, -1.0, 1.0) * e[1:]", "e[:, :1] < 0.0, -1.0, 1.0) * e[:, 1:]")
+    .replace(" - self.rate_gain * measurement.rate", "")
+    + """
+    def inner(self, state, time, command, measurement):
+        torque = command.torque - self.rate_gain * measurement.rate
+        return State(state.integral + 0.01 * measurement.rate), TorqueCommand(torque)
+"""
+)
+
+
+def test_its_inner_loop_is_called_in_each_integration_step(page: Path) -> None:
+    """Of 10 ms in a control period of 50 ms: as one in Python, and again from any instant."""
+    without = ("-\n                             in->gains.rate_gain * in->measurement.rate[i]", "")
+    text = (page / "attitude_law.c").read_text()
+    (page / "looped.c").write_text(text.replace(*without) + INNER.replace("STATUS", "0"))
+    assert without[0] in text
+    compiled(page, "looped.c", "looped.so")
+    shapes = ["state.integral.shape=[3]", "signals.error.shape=[4]"]
+    gains = [f"law.{gain}" for gain in GAINS]
+    in_c = ["law.kind=looped.so:attitude_law", *gains, *(f"law.{each}" for each in shapes), *SHORT]
+    (page / "looped.py").write_text(INNER_IN_PYTHON)
+    result = run(page / "attitude_law.toml", overrides=in_c, out=page / "looped")
+    python = ["law.kind=looped.py:Law", *gains, *SHORT]
+    other = run(page / "attitude_law.toml", overrides=python, out=page / "looped-python").log
+    for topic in ("/state", "/command", "/truth"):
+        for name, values in other.read(topic).items():
+            np.testing.assert_allclose(result.log.read(topic)[name], values, rtol=0, atol=1e-12)
+    assert verify(result.path, start=2.5, trust=True) is None
+    built = assemble(*load(page / "attitude_law.toml", [*in_c, "duration=0.5"]))
+    blocks = list(fly(built, first_start(built, [0, 1]), [0, 1]))
+    state = np.concatenate([block.rows["/state"]["law_integral"] for block in blocks])
+    np.testing.assert_array_equal(state[:, 0], state[:, 1])
+    np.testing.assert_array_equal(state[:, 0], result.log.read("/state", end=0.5)["law_integral"])
+
+
+def test_an_inner_loop_that_returns_an_error_ends_the_flight(page: Path) -> None:
+    text = (page / "attitude_law.c").read_text()
+    (page / "stuck.c").write_text(text + INNER.replace("STATUS", "in->time > 0.025 ? 3 : 0"))
+    compiled(page, "stuck.c", "stuck.so")
+    overrides = ["law.kind=stuck.so:attitude_law", *table()]
+    result = run(page / "attitude_law.toml", overrides=overrides, out=page / "stuck")
+    assert "the law's attitude_law_inner returned 3, which is not 0" in result.trouble
+
+
 def table() -> list[str]:
     """Return the page's gains for a law of another kind, of a flight of two periods."""
     shapes = ["state.integral.shape=[3]", "signals.error.shape=[4]"]

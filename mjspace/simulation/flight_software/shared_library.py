@@ -13,7 +13,7 @@ from mjspace.errors import input_error_at, shortened
 from mjspace.scenario.construct import plain
 from mjspace.scenario.scenario import Component
 from mjspace.scenario.trust import Trust
-from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.assembly import Assembly, under_inner_loop
 from mjspace.simulation.flight_software.interface import interface_of, named_tuple
 from mjspace.simulation.flight_software.structs import LAYOUT, Structs, structs_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
@@ -34,6 +34,8 @@ def fly_under(assembly: Assembly, law: Component, trust: Trust) -> Assembly:
         structs = structs_of(interface_of(assembly), law)
         content = path.read_bytes()
         flown = LibraryLaw(path.name, content, function, structs)
+    if flown.has_inner:
+        assembly = under_inner_loop(assembly)
     gains = law.gains | {name: plain(a) for name, a in structs.constants["gains"].items()}
     table = Component(kind=f"law.so:{function}", **gains)
     return replace(
@@ -58,8 +60,9 @@ class LibraryLaw:
         library = _loaded(name, content)
         _refuse_layout(name, library, structs)
         self._function = function
-        self._step = _function(name, library, function)
-        self._reset = _function(name, library, f"{function}_reset", optional=True)
+        self._step = _function(name, library, function, 3)
+        self._reset = _function(name, library, f"{function}_reset", 2, optional=True)
+        self._inner = _function(name, library, f"{function}_inner", 3, optional=True)
         sizes = {struct: structs.size(struct) for struct in structs.fields}
         self._input = np.zeros(1 + sum(sizes[struct] for struct in _INPUT))
         self._state = np.zeros(sizes["state"])
@@ -79,6 +82,11 @@ class LibraryLaw:
             )
             for struct in returned
         }
+
+    @property
+    def has_inner(self) -> bool:
+        """Whether the library has an inner loop."""
+        return self._inner is not None
 
     def reset(self, measurement: Measurement, reference: DesiredMotion) -> Any:
         """Return the state at the start of a flight: zero, or what ``<function>_reset`` makes.
@@ -101,19 +109,41 @@ class LibraryLaw:
             ReturnError: it returned anything but 0.
         """
         self._tell(time, measurement, reference)
-        for view, values in zip(self._returned["state"][1], state, strict=True):
-            view[...] = values
+        self._give("state", state)
         self._output[:] = 0.0
         self._refuse(self._step(*self._pointers), self._function)
         return self._copy("state"), self._copy("command"), self._copy("signals")
 
-    def _tell(self, time: float, measurement: Measurement, reference: DesiredMotion) -> None:
-        """Fill in the input."""
+    def inner(
+        self, state: Any, time: float, command: Any, measurement: Measurement
+    ) -> tuple[Any, Any]:
+        """Return (state, command) as the inner loop changes those of the step before.
+
+        Its reference is that of the step, the last call before for any vehicle.
+
+        Raises:
+            ReturnError: it returned anything but 0.
+        """
+        self._tell(time, measurement)
+        self._give("state", state)
+        self._give("command", command)
+        self._refuse(self._inner(*self._pointers), f"{self._function}_inner")
+        return self._copy("state"), self._copy("command")
+
+    def _tell(
+        self, time: float, measurement: Measurement, reference: DesiredMotion | None = None
+    ) -> None:
+        """Fill in the input, where there is a ``reference`` that as well."""
         self._input[0] = time
         for name, view in self._measured:
             view[...] = getattr(measurement, name)
-        for name, view in self._desired:
+        for name, view in self._desired if reference is not None else ():
             view[...] = getattr(reference, name)
+
+    def _give(self, struct: str, arrays: Any) -> None:
+        """Fill in what the function changes; the command is the beginning of the output."""
+        for view, values in zip(self._returned[struct][1], arrays, strict=True):
+            view[...] = values
 
     def _refuse(self, status: int, function: str) -> None:
         if status:
@@ -158,13 +188,15 @@ def _refuse_layout(name: str, library: ctypes.CDLL, structs: Structs) -> None:
             )
 
 
-def _function(name: str, library: ctypes.CDLL, function: str, *, optional: bool = False) -> Any:
-    """Return a function of the library; None where it is ``optional`` and not there."""
+def _function(
+    name: str, library: ctypes.CDLL, function: str, arguments: int, *, optional: bool = False
+) -> Any:
+    """Return a function of so many pointers; None where it is ``optional`` and not there."""
     try:
         found = library[function]
     except AttributeError:
         if optional:
             return None
         raise ValueError(f"{name} has no function {function!r}") from None
-    found.argtypes = [ctypes.c_void_p] * (2 if optional else 3)
+    found.argtypes = [ctypes.c_void_p] * arguments
     return found

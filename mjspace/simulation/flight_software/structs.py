@@ -146,6 +146,11 @@ int {function}(const mjspace_input *input, mjspace_state *state, mjspace_output 
    likewise. */
 int {function}_reset(const mjspace_input *input, mjspace_state *state);
 
+/* Optional: the inner loop, called in each integration step, from the control instant on, to change
+   the command that the law returned for this step, and the state. The measurement is what sensors
+   report then, the reference that of the control instant. Returns likewise. */
+int {function}_inner(const mjspace_input *input, mjspace_state *state, mjspace_command *command);
+
 #ifdef __cplusplus
 }}
 #endif
