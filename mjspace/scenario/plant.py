@@ -159,6 +159,10 @@ class PlantTable(Table):
     )
     """None when left out; in an environment with a magnetic field they obey the command's
     ``dipole``."""
+    arms: Annotated[Any, DeclaredIn("mjspace.actuators.arms:Arms")] = None
+    """Robotic arms, by a name of one's own: ``[plant.arms.left]``. They obey the command's
+    ``joint_torque``; their angles and rates are measured as ``gimbal_angle`` and ``gimbal_rate``.
+    Not beside ``drives``, ``servos`` or an ``engine``."""
 
     @property
     def is_own(self) -> bool:

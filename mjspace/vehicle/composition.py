@@ -77,7 +77,7 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
     for name, part in sorted(table.parts.items(), key=lambda item: item[1].deployment is not None):
         _attach_part(spec, name, part)
     for name, moving in table.moving_parts:
-        _attach(spec, moving.build(), name, moving)
+        bolt(spec, moving.build(), name, moving)
     if table.panels and source is None:
         _remove_drawn_panels(spec)
     for name, hinge in table.hinges.items():
@@ -157,11 +157,11 @@ def _attach_part(spec: Any, name: str, part: Part) -> None:
         )
     child = mujoco.MjSpec.from_file(str(ASSETS / f"parts/{part.part}/{part.part}.xml"))
     deployments.prepare(child, part)
-    _attach(spec, child, name, part)
+    bolt(spec, child, name, part)
 
 
-def _attach(spec: Any, child: Any, name: str, where: Mounted) -> None:
-    """Bolt the ``child``, its names with ``name`` before them, to the bus."""
+def bolt(spec: Any, child: Any, name: str, where: Mounted) -> None:
+    """Attach the ``child``, its names with ``name`` before them, to the bus of ``spec``."""
     mount = bus_of(spec).add_frame(pos=where.position)
     mujoco.mju_euler2Quat(mount.quat, np.array(where.euler), "XYZ")  # about fixed axes
     spec.attach(child, prefix=f"{name}_", frame=mount)
