@@ -11,12 +11,14 @@ from pydantic import ConfigDict, Field, RootModel
 
 from mjspace.actuators.base import ActuatorTable, Context
 from mjspace.actuators.model_motors import Clipped
+from mjspace.contract import Array
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import Name, Positive, Si, Table, Unit3
 from mjspace.scenario.mounted import Mounted
 from mjspace.vehicle.composition import bolt
 from mjspace.vehicle.moving_parts import new_part, set_inertia
 from mjspace.vehicle.roles import Motor
+from mjspace.vehicle.vehicle import Vehicle
 
 _HINGE = 1.6  # radius of what is drawn at a hinge, in radii of its link
 
@@ -34,6 +36,12 @@ class Link(Table):
     torque_limit: Annotated[Positive, Si("N m")] | None = None
     """Largest torque of its motor, which has its reaction on what carries the hinge; none when left
     out."""
+
+    @property
+    def inertia(self) -> Array:
+        """Moments about its centre of mass, along it and across it [kg m^2], (3,)."""
+        across = (3.0 * self.radius**2 + self.length**2) / 12.0
+        return self.mass * np.array([0.5 * self.radius**2, across, across])
 
 
 class Arm(Mounted):
@@ -54,9 +62,7 @@ class Arm(Mounted):
         for number, link in enumerate(self.links):
             body = body.add_body(name=f"link_{number}", pos=[reach, 0.0, 0.0])
             reach, r = link.length, link.radius
-            axial, across = 0.5 * r**2, (3.0 * r**2 + reach**2) / 12.0
-            middle = np.array([0.5 * reach, 0.0, 0.0])
-            set_inertia(body, link.mass, middle, link.mass * np.array([axial, across, across]))
+            set_inertia(body, link.mass, np.array([0.5 * reach, 0.0, 0.0]), link.inertia)
             joint = body.add_joint(name=f"joint_{number}", axis=link.axis)
             motor = part.add_actuator(
                 name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
@@ -93,6 +99,15 @@ class Arms(ActuatorTable, RootModel[dict[Name, Arm]]):
         """Return their motors, whose hinges are measured as gimbals."""
         names = tuple(name for name, _ in self._joints())
         return Driven(motors=names, gimbals=names)
+
+    def facts(self, vehicle: Vehicle) -> dict[str, Any]:
+        """Return length, mass and inertia across of each link, in the order of the joints."""
+        links = [link for _, link in self._joints()]
+        return {
+            "link_length": np.array([link.length for link in links]),
+            "link_mass": np.array([link.mass for link in links]),
+            "link_inertia": np.array([link.inertia[1] for link in links]),
+        }
 
     def actuator(self, context: Context) -> "JointMotors":
         """Return their motors."""
