@@ -65,6 +65,7 @@ STANDARD = (
     Panel("Commanded torque on the bus", "/command", "torque", names="xyz"),
     Panel("Wheel motor torque", "/command", "wheel_torque"),
     Panel("Motor torque", "/command", "motor_torque"),
+    Panel("Joint torque", "/command", "applied_joint_torque"),
     Panel("Gimbal angle", "/truth", "gimbal_angle"),
     Panel("Gimbal rate", "/truth", "gimbal_rate", desired=("/command", "gimbal_rate")),
     Panel("Wheel speed", "/truth", "wheel_speed"),

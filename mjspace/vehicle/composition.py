@@ -161,7 +161,16 @@ def _attach_part(spec: Any, name: str, part: Part) -> None:
 
 
 def bolt(spec: Any, child: Any, name: str, where: Mounted) -> None:
-    """Attach the ``child``, its names with ``name`` before them, to the bus of ``spec``."""
+    """Attach the ``child``, its names with ``name`` before them, to the bus of ``spec``.
+
+    Raises:
+        ValueError: the compiler would change the mass of what is attached.
+    """
+    if spec.compiler.settotalmass > 0.0:
+        raise ValueError(
+            f"plant.model: its settotalmass, {spec.compiler.settotalmass:g} kg, would scale the "
+            f"mass of {name} as well: leave it out and give the bodies their masses"
+        )
     mount = bus_of(spec).add_frame(pos=where.position)
     mujoco.mju_euler2Quat(mount.quat, np.array(where.euler), "XYZ")  # about fixed axes
     spec.attach(child, prefix=f"{name}_", frame=mount)

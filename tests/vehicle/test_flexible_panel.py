@@ -145,18 +145,31 @@ def test_mass_counts_as_that_of_parts() -> None:
     assert stability.mass_matrix(told.model)[3, 3] == pytest.approx(120.0, rel=1e-12)
 
 
-def test_a_model_of_ones_own_has_them_in_its_inertia(tmp_path: Path) -> None:
-    (tmp_path / "box.xml").write_text(
-        '<mujoco><default><joint armature="0.1" damping="2"/></default><worldbody>'
-        '<body name="hull"><freejoint/><geom type="box" size="0.4 0.4 0.4" mass="60"/>'
-        "</body></worldbody></mujoco>"
-    )
+OWN = """
+<mujoco>
+  <compiler {compiler}/>
+  <default><joint armature="0.1" damping="2"/></default>
+  <worldbody>
+    <body name="hull"><freejoint/><geom type="box" size="0.4 0.4 0.4" mass="60"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_a_model_of_ones_own_has_them_in_its_inertia_and_no_say_in_them(tmp_path: Path) -> None:
+    (tmp_path / "box.xml").write_text(OWN.format(compiler='boundmass="4" inertiafromgeom="true"'))
     assembly = built({"model": "box.xml"} | panels("left", "right"), folder=tmp_path)
     model = assembly.vehicle.model
     assert not model.dof_armature.any()
     assert not model.dof_damping.any()
     each = 10.0 * 3.0**2 / 12.0 + 10.0 * 1.9**2
     assert assembly.vehicle.inertia[0, 0] == pytest.approx(60 * 0.8**2 / 6 + 2 * each, rel=1e-12)
+
+
+def test_a_model_that_scales_all_masses_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "box.xml").write_text(OWN.format(compiler='settotalmass="70"'))
+    with pytest.raises(InputError, match=r"^plant.model: its settotalmass, 70 kg, .* mass of left"):
+        built({"model": "box.xml"} | panels("left"), folder=tmp_path)
 
 
 @pytest.mark.parametrize(
