@@ -21,7 +21,7 @@ class Hold(Gains):
     def at(self, time: Array) -> Reference:
         """Return the same row for each ``time`` [s]."""
         still = np.zeros_like(time)
-        return _turn(att.normalize(self.attitude), np.zeros(3), (still, still, still))
+        return turned(att.normalize(self.attitude), np.zeros(3), (still, still, still))
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Turning(Gains):
     def at(self, time: Array) -> Reference:
         """Return the turn at each ``time`` [s]."""
         steady = time, np.ones_like(time), np.zeros_like(time)
-        return _turn(att.normalize(self.attitude), self.rate, steady)
+        return turned(att.normalize(self.attitude), self.rate, steady)
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Slew(Gains):
         """Return the slew at each ``time`` [s]; held before it starts and after it ends."""
         start, end = att.normalize(self.start_attitude), att.normalize(self.attitude)
         vector = att.to_rotation_vector(att.multiply(att.conjugate(start), end))
-        return _turn(start, vector, _quintic(time - self.start_time, self.duration))
+        return turned(start, vector, _quintic(time - self.start_time, self.duration))
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Regulation(Gains):
     def at(self, time: Array) -> Reference:
         """Return the turn at each ``time`` [s]; held after it ends."""
         vector = self.angle * att.normalize(self.axis)
-        return _turn(_IDENTITY, vector, _quintic(time, self.duration))
+        return turned(_IDENTITY, vector, _quintic(time, self.duration))
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Sweep(Gains):
         # The difference of two equal ramps, shifted by cruise_end.
         up, down = (self._ramp(time - start) for start in (0.0, self.cruise_end))
         vector = self.peak_rate * att.normalize(self.axis)
-        return _turn(_IDENTITY, vector, (up[0] - down[0], up[1] - down[1], up[2] - down[2]))
+        return turned(_IDENTITY, vector, (up[0] - down[0], up[1] - down[1], up[2] - down[2]))
 
     def _ramp(self, time: Array) -> tuple[Array, Array, Array]:
         """Return the integral of the smooth step s^2 (3 - 2 s), the step, and its derivative."""
@@ -165,7 +165,7 @@ class EulerSinusoids(Gains):
 _IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def _turn(start: Array, vector: Array, part: tuple[Array, Array, Array]) -> Reference:
+def turned(start: Array, vector: Array, part: tuple[Array, Array, Array]) -> Reference:
     """Return a rotation from ``start`` (4,) by ``vector`` (3,) [rad] times a fraction of time.
 
     ``part`` has the fraction, its first derivative [1/s] and its second [1/s^2], each (n,).

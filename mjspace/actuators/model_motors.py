@@ -58,7 +58,7 @@ def _wheels(vehicle: Vehicle) -> ReactionWheels:
 
 
 @dataclass(frozen=True)
-class _Clipped(Actuator):
+class Clipped(Actuator):
     """Motors that obey a command for each at once, within their limits."""
 
     each: tuple[Motor, ...]
@@ -92,7 +92,7 @@ class _Clipped(Actuator):
 
 
 @dataclass(frozen=True)
-class ModelThrusters(_Clipped):
+class ModelThrusters(Clipped):
     """Forces at sites that are throttled: each pushes with the commanded force [N]."""
 
     field: ClassVar[str] = "thruster_force"
@@ -101,7 +101,7 @@ class ModelThrusters(_Clipped):
 
 
 @dataclass(frozen=True)
-class ModelMotors(_Clipped):
+class ModelMotors(Clipped):
     """All other motors: each gets the commanded number as MuJoCo's ``ctrl``, in its own unit."""
 
     field: ClassVar[str] = "control"

@@ -67,24 +67,32 @@ STANDARD = (
     Panel("Commanded torque on the bus", "/command", "torque", names="xyz"),
     Panel("Wheel motor torque", "/command", "wheel_torque"),
     Panel("Motor torque", "/command", "motor_torque"),
+    Panel("Joint torque", "/command", "applied_joint_torque"),
     Panel("Gimbal angle", "/truth", "gimbal_angle"),
     Panel("Gimbal rate", "/truth", "gimbal_rate", desired=("/command", "gimbal_rate")),
     Panel("Wheel speed", "/truth", "wheel_speed"),
     Panel("Change of total momentum", "/truth", "momentum", log_scale=True, drift=True),
     Panel("Disturbance torque about the centre of mass", "/disturbance", "torque", names="xyz"),
 )
+OF_PARTS = {"deflection": "Tip deflection of", "displacement": "Displacement of what sloshes in"}
+"""Titles, before the part's name, of the fields of /truth that end so."""
 
 
 def curves(log: Log) -> list[Curves]:
-    """Return the curves of the standard page: its signals, and the first of the law's that change.
+    """Return the curves of the standard page: its signals, how parts move, and the law's signals.
 
-    A signal that is zero throughout is left out, and so is one of the law's that never changes.
+    Of the law's they are the first that change. A signal that is zero throughout is left out, and
+    so is one of the law's that never changes.
     """
     standard = [
         panel
         for panel in (*STANDARD, *_of_connections(log))
         if log.topics.get(panel.topic, {}).get(panel.field, (0,)) != (0,)
     ]
+    for field in log.topics.get("/truth", {}):
+        part, _, what = field.rpartition("_")
+        if what in OF_PARTS:
+            standard.append(Panel(f"{OF_PARTS[what]} {part}", "/truth", field))
     law = [_of_signal(log, f"law.{field}") for field in log.topics.get("/law", {})]
     found = read(log, [*standard, *law])
     shown = [one for one in found[: len(standard)] if one.value.any()]

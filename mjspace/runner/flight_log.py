@@ -18,6 +18,7 @@ from mjspace.simulation.recording import Block, one_vehicle, shapes
 from mjspace.units import Unit
 from mjspace.vehicle import vehicle
 from mjspace.vehicle.indices import bus_id
+from mjspace.vehicle.moving_parts import reports
 
 _described: dict[bytes, tuple[bytes, Scene]] = {}
 """Of the last model, 10 MB."""
@@ -40,6 +41,8 @@ def units_of(assembly: Assembly, kinds: Mapping[str, type] = {}) -> dict[str, di
         if unit is not None:
             units["/measurement"].setdefault(name, unit)
             units["/truth"].setdefault(quantity, unit)
+    for report in reports(assembly.scenario.plant.moving_parts):
+        units["/truth"][report.field] = Unit(report.unit)
     return units
 
 

@@ -4,7 +4,7 @@ import re
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin
 
 import tomli_w
 from pydantic import BaseModel, ValidationError
@@ -130,11 +130,15 @@ def _keys_at(parents: list[Any]) -> list[str]:
     if parents[:1] == ["sensors"] and len(parents) > 1:
         return list(dict.fromkeys(key for kind in kinds() for key in kind.model_fields))
     model: type[BaseModel] | None = Scenario
+    named = False  # whether the next is a name of the user's
     for part in parents:
-        if isinstance(part, int) or model is None:
+        if isinstance(part, int) or model is None or named:
+            named = False
             continue
         field = model.model_fields.get(part)
-        model = None if field is None else next(tables_in(type_of(field)), None)
+        kind = None if field is None else type_of(field)
+        named = get_origin(kind) is dict
+        model = next(tables_in(kind), None)
     return list(model.model_fields) if model is not None else []
 
 

@@ -28,6 +28,7 @@ from mjspace.scenario.fields import (
     Velocity3,
 )
 from mjspace.scenario.hinges import Hinge
+from mjspace.scenario.mounted import Mounted, MovingPart
 from mjspace.scenario.ports import Port
 from mjspace.units import whole_number
 
@@ -55,15 +56,11 @@ _INERTIAS = ("bus_inertia", "gyrostat_inertia", "vehicle_inertia")
 _STATED_BY_THE_MODEL = ("mass", "vehicle_mass", *_INERTIAS)
 
 
-class Part(Table):
+class Part(Mounted):
     """Something bolted to the bus that moves of itself: a nutation damper, a boom, a yo-yo."""
 
     part: str
     """Name of a folder in assets/parts/."""
-    position: Meters3 = [0.0, 0.0, 0.0]
-    """Of its origin in the bus."""
-    euler: Angles3 = [0.0, 0.0, 0.0]
-    """Roll, pitch, yaw of its axes in the bus's."""
     deployment: Annotated[Any, DeclaredIn("mjspace.vehicle.deployments:Deployment")] = None
     """Of a boom or a yo-yo; it moves as it likes when left out."""
 
@@ -120,6 +117,16 @@ class PlantTable(Table):
     parts: dict[Name, Part] = {}
     """By a name of one's own: ``[plant.parts.damper]``. They add to the bus's mass and inertia, and
     to neither ``gyrostat_inertia`` nor the ``inertia`` that a law is given."""
+    panels: dict[
+        Name, Annotated[Any, DeclaredIn("mjspace.vehicle.flexible_panel:Panel", optional=False)]
+    ] = {}
+    """Flexible panels, by a name of one's own: ``[plant.panels.left]``. Their mass counts as that
+    of ``parts`` does. The solar panels that are drawn on a satellite of ours then are not."""
+    slosh: dict[
+        Name, Annotated[Any, DeclaredIn("mjspace.vehicle.slosh:Slosh", optional=False)]
+    ] = {}
+    """Sloshing propellant, by the tank: ``[plant.slosh.tank]``. Its mass counts as that of
+    ``parts`` does."""
     hinges: dict[JointName, Hinge] = {}
     """Bearings of the model's and the parts' hinges, by the hinge: ``[plant.hinges.cmg_wheel]``."""
     ripple: dict[
@@ -169,11 +176,20 @@ class PlantTable(Table):
     )
     """None when left out; in an environment with a magnetic field they obey the command's
     ``dipole``."""
+    arms: Annotated[Any, DeclaredIn("mjspace.actuators.arms:Arms")] = None
+    """Robotic arms, by a name of one's own: ``[plant.arms.left]``. They obey the command's
+    ``joint_torque``; their angles and rates are measured as ``gimbal_angle`` and ``gimbal_rate``.
+    Not beside ``drives``, ``servos`` or an ``engine``."""
 
     @property
     def is_own(self) -> bool:
         """Whether the model is the user's."""
         return model_source.is_own(self.model)
+
+    @property
+    def moving_parts(self) -> list[tuple[str, MovingPart]]:
+        """The parts that move without a motor and are built by their tables, with their names."""
+        return [*self.panels.items(), *self.slosh.items()]
 
     @property
     def equipment(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from pydantic import (
     Field,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
+    field_serializer,
     field_validator,
     model_validator,
 )
@@ -124,6 +125,11 @@ class Check(SignalRegion):
             raise ValueError(f"got {value!r}, should be a finite number or a list of them")
         kept = [each if isinstance(each, Quantity) else float(each) for each in items]
         return kept if several else kept[0]
+
+    @field_serializer("target")
+    def _in_si(self, target: Any) -> Any:
+        # Pydantic warns of quantities in a list.
+        return [float(each) for each in target] if isinstance(target, list) else target
 
     @model_validator(mode="after")
     def _of_an_error(self) -> Self:

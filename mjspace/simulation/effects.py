@@ -11,6 +11,7 @@ from mjspace.simulation.model_sensors import ModelSensors, depend_on_masses
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_disturbance import UserDisturbance
 from mjspace.vehicle import deployments, ground_contact
+from mjspace.vehicle.moving_parts import LoggedParts, reports
 from mjspace.vehicle.step_effect import StepEffect
 
 
@@ -30,6 +31,7 @@ def effects_of(
         ActuatorFaults.of(assembly, members),
         MagneticField.of(assembly.field),
         UserDisturbance.of(assembly, layout),
+        LoggedParts.of(model, reports(scenario.plant.moving_parts)),
         deployments.of(model, assembly.qpos, scenario.plant.parts, scenario.rates.physics),
     )
     return tuple(effect for effect in every if effect is not None)

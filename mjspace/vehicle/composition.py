@@ -11,6 +11,7 @@ import numpy as np
 from mjspace.errors import input_error_at, nearest
 from mjspace.scenario.hinges import Hinge
 from mjspace.scenario.model_source import ModelSource
+from mjspace.scenario.mounted import Mounted
 from mjspace.scenario.plant import Part, PlantTable
 from mjspace.vehicle import (
     deployments,
@@ -34,6 +35,7 @@ _LOOK = {
     "global_": ("offwidth", "offheight"),
 }
 """What the surroundings need of MuJoCo's visual settings."""
+_DRAWN_PANELS = ("bus_panel", "bus_frame", "bus_yoke")
 _STOP_SPRING = [0.005, 1.0]  # s, damping ratio: of what turns there, whatever its inertia
 _STOP_HARDNESS = [0.95, 0.99, 0.001, 0.5, 2.0]  # MuJoCo's solimp
 
@@ -82,6 +84,10 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
     # Booms last: their motors, which no actuator drives, must not come between the others.
     for name, part in sorted(table.parts.items(), key=lambda item: item[1].deployment is not None):
         _attach_part(spec, name, part)
+    for name, moving in table.moving_parts:
+        bolt(spec, moving.build(), name, moving)
+    if table.panels and source is None:
+        _remove_drawn_panels(spec)
     for name, hinge in table.hinges.items():
         _bear(_hinge(spec, name, of_equipment), hinge)
     _attach_equipment(spec, table, before_parts=False)
@@ -168,10 +174,31 @@ def _attach_part(spec: Any, name: str, part: Part) -> None:
             f"plant.parts.{name}.part: no part {part.part!r}: have {', '.join(part_names())}"
         )
     child = mujoco.MjSpec.from_file(str(ASSETS / f"parts/{part.part}/{part.part}.xml"))
-    mount = bus_of(spec).add_frame(pos=part.position)
-    mujoco.mju_euler2Quat(mount.quat, np.array(part.euler), "XYZ")  # about fixed axes
     deployments.prepare(child, part)
+    bolt(spec, child, name, part)
+
+
+def bolt(spec: Any, child: Any, name: str, where: Mounted) -> None:
+    """Attach the ``child``, its names with ``name`` before them, to the bus of ``spec``.
+
+    Raises:
+        ValueError: the compiler would change the mass of what is attached.
+    """
+    if spec.compiler.settotalmass > 0.0:
+        raise ValueError(
+            f"plant.model: its settotalmass, {spec.compiler.settotalmass:g} kg, would scale the "
+            f"mass of {name} as well: leave it out and give the bodies their masses"
+        )
+    mount = bus_of(spec).add_frame(pos=where.position)
+    mujoco.mju_euler2Quat(mount.quat, np.array(where.euler), "XYZ")  # about fixed axes
     spec.attach(child, prefix=f"{name}_", frame=mount)
+
+
+def _remove_drawn_panels(spec: Any) -> None:
+    """Remove the solar panels that are drawn on a bus of ours, rigid and without mass."""
+    for geom in list(spec.geoms):
+        if geom.classname.name in _DRAWN_PANELS:
+            spec.delete(geom)
 
 
 def _attach_equipment(spec: Any, table: PlantTable, *, before_parts: bool) -> None:

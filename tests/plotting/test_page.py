@@ -16,6 +16,7 @@ from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.plotting.decimate import Line, outlines
 from mjspace.plotting.page import _short, figure, plot
 from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel, curves, read
+from mjspace.runner.run import run
 from mjspace.scenario.scenario import Check
 
 ERROR, RATE, SPEED, MOMENTUM = (
@@ -295,3 +296,12 @@ def test_labels_of_an_axis_are_short_and_exact() -> None:
     labels = [_short(value).replace("\N{MINUS SIGN}", "-") for value in values]
     assert labels == ["0", "0.25", "-1", "0.001", "-2.5e-4", "7.5e-4", "2e-6", "123456", "-1.25e7"]
     assert [float(label) for label in labels] == list(values)
+
+
+def test_moving_parts_have_panels_by_their_names(tmp_path: Path) -> None:
+    tank = "plant.slosh.tank={model='spring',mass=5,frequency=0.5}"
+    short = ["duration=1.2", "checks=[]", tank, "initial.joint_position={tank_slide_x=0.01}"]
+    log = run("flexible-bang-bang", overrides=short, out=tmp_path / "it").log
+    shown = titles(figure(log))
+    assert "Tip deflection of left [m]" in shown
+    assert "Displacement of what sloshes in tank [m]" in shown

@@ -319,3 +319,11 @@ def test_a_control_period_has_not_more_steps_than_can_be_waited_for(minimal: Pat
 def test_component_from_the_command_line() -> None:
     law = component("contraction:Ideal", ["rate_gain=3", "inertia=[[1,0,0],[0,1,0],[0,0,1]]"])
     assert law.gains == {"rate_gain": 3, "inertia": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+
+
+@pytest.mark.filterwarnings("error")
+def test_targets_with_units_are_written_out_in_si(minimal: Path) -> None:
+    check = "{name='x', signal='truth.gimbal_angle', target=['90 deg', 0], below=1}"
+    scenario, _ = load(minimal, [f"checks=[{check}]"])
+    (written,) = tomllib.loads(to_toml(scenario))["checks"]
+    assert written["target"] == [np.pi / 2, 0.0]

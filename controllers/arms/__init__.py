@@ -1,0 +1,1 @@
+"""Robotic arms on satellites."""
