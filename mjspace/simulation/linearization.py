@@ -64,6 +64,7 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
     names, units = zip(*_states(vehicle), strict=True)
     kept = [i for i, name in enumerate(names) if name]
     nominal = initial_physics(assembly, 1)[0]
+    _refuse_dry_friction(model, assembly.qvel)
     moved, step = _perturbed(model, nominal)
     nx, nu = len(step), len(inputs.step)
     # The nominal vehicle; each state moved up and down; each input moved up and down from its
@@ -242,6 +243,18 @@ def _refuse_memory(assembly: Assembly) -> None:
         raise InputError(
             "plant.model: its motors act late (nsample, delay), which a linear model of the motion "
             "lacks: linearize it without"
+        )
+
+
+def _refuse_dry_friction(model: Any, qvel: Array) -> None:
+    """Refuse a model's own dry friction where it is at rest: its slope there is the solver's."""
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONSTRAINT:
+        return
+    for dof in np.flatnonzero((model.dof_frictionloss > 0.0) & (np.abs(qvel) <= _STEP)):
+        name = model.joint(int(model.dof_jntid[dof])).name
+        raise InputError(
+            f"plant.model: joint {name!r} has dry friction and is at rest, where it has no slope: "
+            "linearize it in motion (initial.joint_speed), or without its frictionloss"
         )
 
 

@@ -77,8 +77,11 @@ class Sensor(Data):
     """A sensor of the model's own."""
 
     name: str
+    measured_as: str
+    """The field of the measurement."""
     kind: str
     size: int
+    unit: str
 
 
 class Field(Data):
@@ -156,7 +159,10 @@ def inspect(source: ModelSource, table: PlantTable) -> Inspection:
         model=source.name,
         step=_rates(model).physics,
         bodies=[_body(model, i) for i in range(1, model.nbody)],
-        sensors=[Sensor(name=s.name, kind=s.kind, size=s.size) for s in sensors_of(model)],
+        sensors=[
+            Sensor(name=s.name, measured_as=s.field, kind=s.kind, size=s.size, unit=s.unit)
+            for s in sensors_of(model)
+        ],
         cameras=[model.camera(i).name or f"camera {i}" for i in range(model.ncam)],
         vehicle=None if vehicle is None else _whole(vehicle),
         findings=findings,

@@ -25,10 +25,11 @@ def show(found: Inspection) -> None:
     console.print(bodies)
     if found.vehicle is not None:
         _show_vehicle(console, found.vehicle)
-    say(
-        f"sensors: {', '.join(f'{s.name} ({s.kind})' for s in found.sensors) or 'none'}",
-        markup=False,
-    )
+    sensors = [
+        f"{s.name} ({s.kind})" + (f" as {s.measured_as}" if s.measured_as != s.name else "")
+        for s in found.sensors
+    ]
+    say(f"sensors: {', '.join(sensors) or 'none'}", markup=False)
     say(f"cameras: {', '.join(found.cameras) or 'none; one is added'}", markup=False)
 
 

@@ -1,6 +1,7 @@
 """The sensors that a user's own model has."""
 
 import re
+from keyword import iskeyword
 from typing import Any, NamedTuple
 
 import mujoco
@@ -43,7 +44,8 @@ class ModelSensor(NamedTuple):
     name: str
     """As the model has it."""
     field: str
-    """Of the measurement: the name with an underscore for what no name in Python can have."""
+    """Of the measurement: the name with an underscore for what no name in Python or a log can have,
+    and ``model_`` before it where that is taken."""
     kind: str
     """MuJoCo's: "gyro", "framequat", ...."""
     size: int
@@ -62,11 +64,14 @@ class ModelSensor(NamedTuple):
 def sensors_of(model: Any) -> tuple[ModelSensor, ...]:
     """Return the sensors of a compiled model whose sensors have names."""
     found = []
-    taken = {*Measurement.__annotations__}
+    taken = {"time", *Measurement.__annotations__}
     for i in range(model.nsensor):
         name = model.sensor(i).name
-        plain = re.sub(r"\W|^(?=\d)", "_", name)
-        plain = f"model_{plain}" if plain in taken or plain.startswith("_") else plain
+        plain = re.sub(r"\W|^(?=\d)", "_", name, flags=re.ASCII)
+        if plain in taken or plain.startswith("_") or iskeyword(plain):
+            plain = f"model_{plain}"
+        while plain in taken:
+            plain += "_"
         taken.add(plain)
         kind = _named(model.sensor_type[i])
         size, of_forces = int(model.sensor_dim[i]), model.sensor_needstage[i] == _OF_FORCES

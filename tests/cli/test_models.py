@@ -54,7 +54,7 @@ def test_inspect_says_what_is_recognized(mjspace: Command) -> None:
         "its gravity, [ 0.    0.   -9.81] m/s^2, is replaced by the scenario's environment",
         "bus 'hub', 9.1 kg",
         "a law commands: torque (3) [N m], thruster_force (1) [N], control (1)",
-        "imu_rate (gyro)",
+        "imu_rate (gyro), star-tracker (framequat) as star_tracker, acceleration (accelerometer)",
         "measured hinges: elbow",
     ):
         assert text in shown.out

@@ -289,6 +289,15 @@ def test_the_outputs_of_ones_own_sensors_are_those_of_motion(tmp_path: Path) -> 
     assert plant.C.shape == (len(plant.outputs), len(plant.states))
 
 
+def test_dry_friction_in_motion_is_constant(tmp_path: Path) -> None:
+    moving = ["initial.rate=[0, 0, 0]", "initial.joint_speed.elbow=0.5"]
+    dry = SENSED.replace('name="elbow" axis', 'name="elbow" frictionloss="0.01" axis')
+    plant, without = (mjspace.linearize(write(tmp_path, text), moving) for text in (dry, SENSED))
+    speed = list(plant.states).index("gimbal_rate[0]")
+    by_speed = without.A[:, speed]
+    np.testing.assert_allclose(plant.A[:, speed], by_speed, atol=1e-6 * np.abs(by_speed).max())
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -299,6 +308,10 @@ def test_the_outputs_of_ones_own_sensors_are_those_of_motion(tmp_path: Path) -> 
         (
             ('<motor joint="rw3"/>', '<muscle name="m" joint="rw3" lengthrange="0 1" force="1"/>'),
             r"(m\.activation|command\.control\[1\]): does not act linearly about zero",
+        ),
+        (
+            ('name="elbow" axis', 'name="elbow" frictionloss="0.01" axis'),
+            r"plant\.model: joint 'elbow' has dry friction and is at rest",
         ),
         (
             ('<motor joint="rw3"/>', '<motor joint="rw3" nsample="5" delay="0.01"/>'),

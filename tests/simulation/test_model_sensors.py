@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from compiled_flights import SHORT_BLOCKS, assert_same, flown
-from own_models import SENSED, built, write
+from own_models import LAW, SENSED, built, write
 
 from mjspace import attitude
 from mjspace.runner.replay import verify
@@ -181,6 +181,21 @@ def test_they_are_compiled_as_in_python_and_replayed(tmp_path: Path) -> None:
     result = run(tmp_path / "hold.toml", out=tmp_path / "out")
     assert verify(result.path, trust=True) is None
     assert verify(result.path, start=1.0, trust=True) is None
+
+
+def test_each_is_measured_under_a_name_of_its_own(tmp_path: Path) -> None:
+    names = {"time": "model_time", "größe": "gr__e", "class": "model_class", "1st": "model__1st"}
+    names |= {"a-b": "a_b", "a.b": "model_a_b", "a b": "model_a_b_", "rate": "model_rate"}
+    names["Big"] = "Big"
+    sensors = "".join(f'<gyro name="{name}" site="imu"/>' for name in names)
+    start, end = SENSED.index("<gyro"), SENSED.index("</sensor>")
+    assembly = built(tmp_path, model=SENSED[:start] + sensors + SENSED[end:])
+    assert [sensor.field for sensor in assembly.vehicle.own.sensors] == list(names.values())
+    (tmp_path / "law.py").write_text(LAW.replace("imu_rate", "Big").replace(
+        "measurement.elbow_angle", "measurement.gimbal_angle"
+    ).replace("star_tracker", "model_class"))  # fmt: skip
+    log = run(tmp_path / "hold.toml", out=tmp_path / "out", overrides=["duration=0.1"]).log
+    assert set(names.values()) <= log.read("/measurement").keys()
 
 
 def test_with_masses_that_burn_they_tell_of_those_of_the_instant(tmp_path: Path) -> None:
