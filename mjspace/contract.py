@@ -321,6 +321,7 @@ def gain(
     at_most: float | None = None,
     whole: bool = False,
     form: Form = "",
+    one_for_all: bool = False,
 ) -> Any:
     """Declare a law's or a reference's parameter: its SI unit, array shape and range.
 
@@ -331,7 +332,8 @@ def gain(
     infinity, for a limit that may be absent. ``whole`` admits whole numbers only. ``form`` is what
     the array has to be as a whole: an "inertia" (symmetric, positive definite), or rows that are
     each a "direction" (not zero), a "unit vector" or a "quaternion" (of norm 1 to 1e-3), or
-    "increasing" values.
+    "increasing" values. ``one_for_all`` admits a single number in place of the array, and so does
+    the law.
 
     The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
     constructed in Python. A gain without a default that is named like one of the plant's properties
@@ -340,9 +342,10 @@ def gain(
     of the table: it is then taken from the vehicle as flown.
     """
     limits = Range(above, at_least, below, at_most, whole)
-    metadata = {"unit": unit, "shape": shape, "range": limits, "form": form}
+    metadata: dict[str, Any] = {"unit": unit, "shape": shape, "range": limits, "form": form}
+    metadata["one_for_all"] = one_for_all
     if default is MISSING:
         return field(metadata=metadata)
-    if shape:
+    if shape and not one_for_all:
         return field(metadata=metadata, default_factory=lambda: np.array(default, dtype=float))
     return field(metadata=metadata, default=default)

@@ -116,6 +116,57 @@ def test_a_batch_is_its_vehicles() -> None:
     assert (every["rcs_propellant"] == 0.0).any()
 
 
+UNLIKE = {
+    "thrust": [1.0, 2.0, 3.0],
+    "specific_impulse": [150.0, 220.0, 290.0],
+    "minimum_on": [0.0, 0.009, 0.0],
+    "delay": [0.0, 0.003, 0.031],
+    "rise": [0.004, 0.0, 0.0],
+}
+
+
+def test_each_of_unlike_thrusters_flies_as_it_does_alone() -> None:
+    table = Rcs(**layout(3) | UNLIKE, propellant=0.5)
+    flown = built(table, "rcs_tank", mass=0.5, inertia=0.01)
+    pulses = [[0.0125, 0.002, 0.02], [0.0, 0.02, 0.004], *[[0.0] * 3] * 30]
+    state, impulse, cut = thruster_samples.fire(flown, pulses)
+    used = 0.0
+    for i in range(3):
+        keys = {key: values[i] for key, values in UNLIKE.items()}
+        one = built(Rcs(**layout(1) | keys, propellant=0.5), "rcs_tank", mass=0.5, inertia=0.01)
+        alone, its_impulse, its_cut = thruster_samples.fire(one, [p[i] for p in pulses])
+        np.testing.assert_array_equal(impulse[:, i], its_impulse[:, 0])
+        np.testing.assert_array_equal(cut[:, i], its_cut[:, 0])
+        used += 0.5 - alone["rcs_propellant"][0, 0]
+        assert impulse[:, i].sum() == pytest.approx(keys["thrust"] * [0.0125, 0.029, 0.024][i])
+    assert 0.5 - state["rcs_propellant"][0, 0] == pytest.approx(used, rel=1e-9)
+    by_hand = impulse.sum(axis=0) / (np.array(UNLIKE["specific_impulse"]) * STANDARD_GRAVITY)
+    assert used == pytest.approx(by_hand.sum(), rel=1e-9)
+
+
+def test_what_a_fault_adds_is_burnt_by_the_flow_of_its_own_thruster() -> None:
+    table = Rcs(**layout(3) | UNLIKE, propellant=0.5)
+    flown = built(table, "rcs_tank", mass=0.5, inertia=0.01)
+    applied, instead = np.array([[1.0, 0.0, 3.0]]), np.array([[1.0, 2.0, 0.0]])
+    after, thrust = flown.account_propellant(flown.reset(1), applied, instead, STEP)
+    np.testing.assert_array_equal(thrust, instead)
+    burnt = STEP * (2.0 / 220.0 - 3.0 / 290.0) / STANDARD_GRAVITY
+    assert 0.5 - after["rcs_propellant"][0, 0] == pytest.approx(burnt, abs=1e-15)
+
+
+def test_a_list_of_equal_numbers_is_one_number_for_all() -> None:
+    keys = {"minimum_on": 0.007, "delay": 0.013, "rise": 0.01, "specific_impulse": 220.0}
+    lists = {key: [value] * 3 for key, value in keys.items()}
+    pulses = np.random.default_rng(4).uniform(-0.01, 0.025, (8, 3))
+    one, other = (
+        built(Rcs(**layout(3) | table, propellant=2e-5), "rcs_tank", mass=0.5, inertia=0.01)
+        for table in (keys, lists | {"thrust": [FORCE] * 3})
+    )
+    np.testing.assert_equal(
+        thruster_samples.fire(one, pulses), thruster_samples.fire(other, pulses)
+    )
+
+
 RCS = Rcs(
     positions=[[0.4, 0.0, 0.5], [0.0, -0.4, 0.1]],
     directions=[[2.0, 0.0, 0.0], [0.0, 3.0, 4.0]],
@@ -151,6 +202,10 @@ def test_a_thruster_pushes_where_it_is_and_along_its_direction(axes: Any) -> Non
         ({"directions": [[1, 0, 0]]}, "1 rows for 2 positions"),
         ({"directions": [[1, 0, 0], [0, 0, 0]]}, "which has no direction"),
         ({"propellant": None}, "give both or neither"),
+        ({"thrust": [1.0]}, "thrust: 1 numbers for 2 positions: give one, or as many"),
+        ({"specific_impulse": [220.0] * 3}, "specific_impulse: 3 numbers for 2 positions"),
+        ({"delay": [0.0, -1.0]}, "greater than or equal to 0"),
+        ({"thrust": [1.0, 0.0]}, "greater than 0"),
     ],
 )
 def test_what_makes_no_sense_is_refused(change: dict[str, Any], message: str) -> None:

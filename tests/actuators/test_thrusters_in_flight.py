@@ -70,6 +70,22 @@ def test_a_batch_is_as_one_and_its_tanks_empty() -> None:
     assert 0.99 < one.rows["/truth"]["propellant"][-1, 0, 0] < 0.9999
 
 
+def test_unlike_thrusters_turn_a_satellite_as_alike_ones_do(tmp_path: Path) -> None:
+    """The law is told each one's force and least pulse; what it commands is what the bus gets."""
+    unlike = [
+        "plant.rcs.thrust=[0.5,0.8,0.5,0.5,0.9,0.5,0.5,0.7,0.5,0.6,0.5,0.5]",
+        "plant.rcs.minimum_on=[0.01,0.02,0.01,0.01,0.03,0.01,0.01,0.01,0.01,0.01,0.01,0.01]",
+        "plant.rcs.specific_impulse=[220,200,220,220,220,220,220,220,220,220,220,180]",
+    ]
+    flown = run("rcs-three-axis", overrides=["duration=20", "checks=[]", *unlike], out=tmp_path)
+    truth = flown.log.read("/truth")
+    assert truth["rate"][-1] @ truth["rate"][-1] > 1e-4  # it slews
+    assert np.rad2deg(truth["attitude_error"]).max() < 0.06
+    assert np.abs(truth["velocity"]).max() < 1e-3  # pairs fire for unlike times, with no net push
+    assert not [event for event in flown.log.events() if "saturated" in event.message]
+    assert verify(flown.path) is None
+
+
 def test_a_picture_shows_the_plumes_of_those_that_are_on() -> None:
     built = assemble(*load("detumble-thrusters"))
     model, start = built.vehicle.model, first_start(built, [0])
