@@ -248,7 +248,8 @@ class PulseCommand(NamedTuple):
 
     on_time: Annotated[Array, Unit("s")]
     """For how long each is on, from the beginning of the control period [s], shape (..., n); of the
-    integration step, where an inner loop commands it."""
+    integration step, where an inner loop commands it. A negative one shuts a valve whose burn is
+    longer than that (``burns = "to_the_end"``)."""
 
 
 class Law(Protocol):

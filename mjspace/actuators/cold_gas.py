@@ -36,8 +36,8 @@ class ColdGas(ThrusterTable):
     """On/off cold-gas thrusters on one tank; ``thrust`` is of a full tank.
 
     They are alike but for what is a list with a number for each. Their command is an ``on_time``
-    for each, of the control period that begins. The gas fills a sphere at the body origin; its
-    pressure falls as it is spent, and the thrust with it.
+    for each, from the beginning of the control period. The gas fills a sphere at the body origin;
+    its pressure falls as it is spent, and the thrust with it.
     """
 
     excludes: ClassVar[tuple[str, ...]] = ("rcs",)
@@ -72,7 +72,8 @@ class ColdGas(ThrusterTable):
         thrust, impulse = self.of_each("thrust"), self.of_each("specific_impulse")
         speed = impulse[0] * STANDARD_GRAVITY
         each = np.stack([thrust / thrust[0], impulse[0] / impulse, shortest], axis=-1)
-        data = np.array([thrust[0], speed, self.gas, self.exponent, period, float(steps)])
+        timing = [period, float(steps), self.to_the_end]
+        data = np.array([thrust[0], speed, self.gas, self.exponent, *timing])
         return ColdGasThrusters(each, data, tank, model.body_inertia[tank] / self.gas)
 
 
@@ -81,8 +82,8 @@ class ColdGasThrusters(Actuator):
     """On/off thrusters that obey a ``PulseCommand``, on a tank that blows down.
 
     A pulse begins with its control period, or with the integration step for which an inner loop
-    commands it, and ends within it. The impulse of each integration step is exact; thrusters that
-    are open for different parts of a step share it by their times.
+    commands it, and ends within it or, where burns go on, later. The impulse of each integration
+    step is exact; thrusters that are open for different parts of a step share it by their times.
     """
 
     each: Array
@@ -117,22 +118,30 @@ class ColdGasThrusters(Actuator):
         return motors(names(self.count))
 
     def reset(self, vehicles: int) -> State:
-        """Return a full tank: "cold_gas" [kg], and "cold_gas_step", steps in the period; (N, 1)."""
+        """Return a full tank: "cold_gas" [kg], and "cold_gas_step", steps in the period; (N, 1).
+
+        Where burns go on, "cold_gas_on" (N, n) is for how long each was to be on when the control
+        period began [s].
+        """
         gas, step = np.full((vehicles, 1), self.data[2]), np.zeros((vehicles, 1))
-        return {"cold_gas": gas, "cold_gas_step": step}
+        on = {"cold_gas_on": np.zeros((vehicles, self.count))} if self.data[-1] else {}
+        return {"cold_gas": gas, "cold_gas_step": step, **on}
 
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
         """Return (state, mean thrust [N], saturated), (N, n).
 
-        A thruster is saturated when its on-time is no part of the control period or shorter than
-        the least pulse.
+        A thruster is saturated when its on-time is no part of the control period, where it has to
+        be one, or shorter than the least pulse.
         """
-        gas, count, mean, saturated = _blow_down.ufunc(
-            command.on_time, state["cold_gas"], state["cold_gas_step"], self.each, self.data, step
+        before = state["cold_gas"], state["cold_gas_step"]
+        on = state.get("cold_gas_on", np.zeros(self.count))
+        gas, count, on, mean, saturated = _blow_down.ufunc(
+            command.on_time, *before, on, self.each, self.data, step
         )
-        return {"cold_gas": gas, "cold_gas_step": count}, mean, saturated
+        after = {"cold_gas": gas, "cold_gas_step": count}
+        return after | ({"cold_gas_on": on} if self.data[-1] else {}), mean, saturated
 
     def measured(self, state: State, truth: Measurement) -> Measurement:
         """Return the truth with the gas that is left, after an engine's propellant."""
@@ -159,32 +168,43 @@ class ColdGasThrusters(Actuator):
 
 
 @gufunc(
-    ["void(f8[:],f8[:],f8[:],f8[:,:],f8[:],f8,f8[:],f8[:],f8[:],f8[:])"],
-    "(n),(o),(o),(n,k),(d),()->(o),(o),(n),(n)",
+    ["void(f8[:],f8[:],f8[:],f8[:],f8[:,:],f8[:],f8,f8[:],f8[:],f8[:],f8[:],f8[:])"],
+    "(n),(o),(o),(n),(n,k),(d),()->(o),(o),(n),(n),(n)",
 )
 def _blow_down(
     on_time: Any,
     gas: Any,
     count: Any,
+    on: Any,
     each: Any,
     data: Any,
     step: Any,
     gas_after: Any,
     count_after: Any,
+    on_after: Any,
     mean: Any,
     saturated: Any,
 ) -> None:
     """Advance the tank by ``step`` [s]; compute each thruster's mean thrust [N]."""
-    force, speed, full, exponent, period, steps = data
+    force, speed, full, exponent, period, steps, to_the_end = data
     total = 0.0  # time of valves like the first's that let pass as much
     for i in range(on_time.size):
         commanded, least = on_time[i], each[i, 2]
         short = 0.0 < commanded < least
-        applied = least if short else min(max(commanded, 0.0), period)
+        applied = least if short else max(commanded, 0.0)
+        if to_the_end == 0.0:
+            applied = min(applied, period)
+        elif count[0] > 0.0:
+            applied = on[i]
+        elif commanded >= 0.0:
+            applied = max(applied, on[i] - period)
+        on_after[i] = applied
         opened = min(max(applied - count[0] * step, 0.0), step)
         mean[i] = each[i, 0] * opened
         total += each[i, 1] * mean[i]
-        saturated[i] = 1.0 if short or commanded < 0.0 or commanded > period + 1e-12 else 0.0
+        beyond = commanded < 0.0 or commanded > period + 1e-12
+        short = short and applied <= least
+        saturated[i] = 1.0 if short or (beyond and to_the_end == 0.0) else 0.0
     before, spent = gas[0] / full, total * force / (full * speed)
     half = 0.5 * (exponent - 1.0)
     # The logarithm of what is left: differences of powers would lose the digits of short pulses.

@@ -1,6 +1,6 @@
 """Where on/off thrusters are and which way they push: what the tables of all kinds have."""
 
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import mujoco
 import numpy as np
@@ -44,6 +44,10 @@ class ThrusterTable(ActuatorTable, Table):
     """Of each, steady."""
     minimum_on: Annotated[EachNonNegative, Si("s")] = 0.0
     """A valve that opens stays open at least that long, even if commanded for less."""
+    burns: Literal["within_period", "to_the_end"] = "within_period"
+    """What is left of an on-time at the end of its control period: cut off; or burnt in the periods
+    that follow, in which a longer on-time lengthens the burn, a shorter one or zero leaves it, and
+    a negative one shuts the valve."""
 
     @model_validator(mode="after")
     def _one_for_each(self) -> Self:
@@ -62,6 +66,11 @@ class ThrusterTable(ActuatorTable, Table):
         rows = np.array(self.directions)
         unit: list[list[float]] = (rows / np.linalg.norm(rows, axis=1, keepdims=True)).tolist()
         return unit
+
+    @property
+    def to_the_end(self) -> float:
+        """Whether a burn may be longer than a control period, 1.0 or 0.0, as kernels read it."""
+        return float(self.burns == "to_the_end")
 
     def of_each(self, key: str) -> Array:
         """Return the numbers of each thruster under a ``key``, shape (n,)."""

@@ -32,8 +32,8 @@ class Rcs(ThrusterTable):
     """On/off thrusters, one for each row of ``positions``.
 
     They are alike but for what is a list with a number for each. Their command is an ``on_time``
-    for each, of the control period that begins. Propellant is in a spherical tank at the body
-    origin, full of hydrazine at first; it loses mass and keeps its size.
+    for each, from the beginning of the control period. Propellant is in a spherical tank at the
+    body origin, full of hydrazine at first; it loses mass and keeps its size.
     """
 
     each: ClassVar[tuple[str, ...]] = (
@@ -76,7 +76,7 @@ class Rcs(ThrusterTable):
         valve = [self.of_each(key) for key in ("minimum_on", "delay", "rise")]
         each = np.stack([self.of_each("thrust"), flow, *valve], axis=-1)
         memory = 1 + ceil(np.max(self.delay) / period - 1e-9)
-        timing = np.array([period, float(steps)])
+        timing = np.array([period, float(steps), self.to_the_end])
         return Thrusters(each, timing, memory, tank, full, self.propellant or 0.0)
 
 
@@ -85,7 +85,8 @@ class Thrusters(Actuator):
     """On/off thrusters that obey a ``PulseCommand``.
 
     A pulse begins a ``delay`` after its control period does, or the integration step for which an
-    inner loop commands it; one that lasts its whole period joins the next. A valve that has opened
+    inner loop commands it; one that lasts its whole period joins the next, and what is longer is
+    cut, or goes on into the next. A valve that has opened
     stays open for ``minimum_on``: a shorter command is lengthened and not dropped. Each integration
     step has the impulse that valve and lag give it, exactly.
     """
@@ -94,7 +95,8 @@ class Thrusters(Actuator):
     """Thrust [N], flow of propellant for each newton [kg/s/N], least on-time, delay and time
     constant [s] of each thruster, shape (n, 5)."""
     timing: Array
-    """How long a command holds [s], and of how many integration steps that is."""
+    """How long a command holds [s], of how many integration steps that is, and whether a burn may
+    be longer (1.0), shape (3,)."""
     memory: int
     """How many commands may still be on their way to the valves."""
     tank: int
@@ -129,8 +131,9 @@ class Thrusters(Actuator):
 
         The fields: "rcs_thrust" [N], "rcs_open" [s] (for how long each valve has been open, zero
         for a closed one) and "rcs_on_time" [s] (how long it has been since the start), each (N, n);
-        "rcs_asked" [s], (N, n, periods), the newest on-times first; "rcs_step" (N, 1), integration
-        steps since the control period began; "rcs_propellant" [kg], (N, 1).
+        "rcs_asked" [s], (N, n, periods), the newest on-times first, each at least what was left of
+        the one before where burns go on; "rcs_step" (N, 1), integration steps since the control
+        period began; "rcs_propellant" [kg], (N, 1).
         """
         none = np.zeros((vehicles, self.count))
         return {
@@ -143,7 +146,9 @@ class Thrusters(Actuator):
         }
 
     def limits(self) -> dict[str, tuple[Array, Array]]:
-        """Return on-times from none to the whole period of a command."""
+        """Return on-times from none to the whole period of a command; any where burns go on."""
+        if self.timing[2]:
+            return super().limits()
         return {"on_time": (np.zeros(self.count), np.full(self.count, self.timing[0]))}
 
     def act(
@@ -151,8 +156,8 @@ class Thrusters(Actuator):
     ) -> tuple[State, Array, Array]:
         """Return (state, mean thrust [N], saturated), (N, n).
 
-        A thruster is saturated when its on-time is no part of the control period or shorter than
-        the least pulse, or when its tank is empty.
+        A thruster is saturated when its on-time is no part of the control period, where it has to
+        be one, or shorter than the least pulse, or when its tank is empty.
         """
         before = (state[name] for name in FIELDS)
         *after, mean, saturated = _pulse.ufunc(
@@ -220,7 +225,7 @@ def _pulse(
     saturated: Any,
 ) -> None:
     """Advance valves, thrust and tank by ``step`` [s]; compute each thruster's mean thrust [N]."""
-    period, steps = timing
+    period, steps, to_the_end = timing
     elapsed = count[0] * step
     burnt = 0.0
     for i in range(thrust.size):
@@ -229,9 +234,15 @@ def _pulse(
         commanded_after[i] = commanded[i]
         if count[0] == 0.0:
             commanded_after[i, 1:] = commanded[i, :-1]
-            commanded_after[i, 0] = min(max(command[i], 0.0), period)
-        short = 0.0 < command[i] < least - _ROUNDING
+            newest = min(max(command[i], 0.0), period)
+            if to_the_end > 0.0:
+                left = commanded[i, 0] - period if command[i] >= 0.0 else 0.0
+                newest = max(command[i], left, 0.0)
+            commanded_after[i, 0] = newest
+        # Of burns that go on, a shorter command than what is left has no effect.
+        short = 0.0 < command[i] < least - _ROUNDING and commanded_after[i, 0] <= command[i]
         beyond = command[i] < 0.0 or command[i] > period + _ROUNDING
+        beyond = beyond and to_the_end == 0.0
         saturated[i] = 1.0 if short or beyond or (dry and command[i] > 0.0) else 0.0
 
         now, impulse, open_for, on = 0.0, 0.0, opened[i], on_time[i]
@@ -241,7 +252,7 @@ def _pulse(
             is_open, until = False, step
             for k in range(commanded.shape[1]):
                 start = delay - elapsed - k * period
-                stop = start + commanded_after[i, k]
+                stop = start + min(commanded_after[i, k], period)
                 if start - _ROUNDING <= now < stop - _ROUNDING:
                     is_open = True
                     until = min(until, stop)

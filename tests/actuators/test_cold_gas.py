@@ -83,6 +83,27 @@ def test_valves_share_one_tank_and_a_batch_is_its_vehicles() -> None:
     np.testing.assert_allclose(together["cold_gas"], one_by_one["cold_gas"], rtol=1e-14)
 
 
+def test_a_burn_goes_on_to_its_end_and_can_be_shut() -> None:
+    flown = thrusters(2, burns="to_the_end", minimum_on=0.0075)
+    shut = [[0.0, -1.0], [0.0, 0.0], [0.0, 0.002]]
+    state, impulse, cut = fire(flown, [[0.1234, 0.05], [0.03, 0.05], *shut, *[[0.0, 0.0]] * 5])
+    # Without regulator, but of so little gas that it hardly matters: 0.6 % in a step.
+    edges = STEP * np.arange(41)
+    expected = [
+        np.diff(np.clip(edges, 0.0, 0.1234)),
+        np.diff(np.clip(edges, 0.0, 0.04) + np.clip(edges, 0.08, 0.0875)),
+    ]
+    np.testing.assert_allclose(impulse.T / FORCE, expected, rtol=0.1, atol=1e-15)
+    # The closed form of the isothermal tank, by the time for which valves were open.
+    open_for = 0.1234 + 0.04 + 0.0075
+    left = np.exp(-open_for * FORCE / (GAS * SPEED))
+    assert state["cold_gas"][0, 0] / GAS == pytest.approx(left, rel=1e-13)
+    assert impulse.sum() == pytest.approx(SPEED * GAS * (1.0 - left), rel=1e-11)
+    assert cut[:, 1].tolist() == [0.0] * 16 + [1.0] * 4 + [0.0] * 20
+    assert not cut[:, 0].any()
+    check_batch(thrusters(3, burns="to_the_end"))
+
+
 def test_unlike_valves_follow_the_equations_of_flow_and_thrust() -> None:
     exponent, on = 1.4, 3.0
     thrust, impulse = np.array([2.0, 0.5, 1.0]), np.array([70.0, 55.0, 60.0])

@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 import thruster_samples
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pydantic import ValidationError
 from thruster_samples import FORCE, PERIOD, STEP, TRUTH, built, check_batch, layout
 
@@ -114,6 +116,75 @@ def test_a_batch_is_its_vehicles() -> None:
     )
     every = check_batch(flown)
     assert (every["rcs_propellant"] == 0.0).any()
+
+
+def burns(on_times: Any) -> Array:
+    """Return when a valve opens and shuts [s], (n, 2), of on-times that are burnt to the end."""
+    found = list[list[float]]()
+    for number, on in enumerate(on_times):
+        now = number * PERIOD
+        if on < 0.0:
+            if found:
+                found[-1][1] = min(found[-1][1], now)
+        elif on > 0.0:
+            if not found or found[-1][1] < now:
+                found.append([now, now])
+            found[-1][1] = max(found[-1][1], now + on)
+    return np.array(found).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.003, 0.0125, 0.033])
+@pytest.mark.parametrize(
+    ("on_times", "spans"),
+    [
+        ([0.1234], [(0.0, 0.1234)]),
+        ([0.05, 0.0, 0.0501], [(0.0, 0.0901)]),  # lengthened
+        ([0.0, 0.1, 0.03, 0.001], [(0.02, 0.12)]),  # what is shorter does not cut it
+        ([0.1, 0.0, -1.0, 0.0, 0.01], [(0.0, 0.04), (0.08, 0.09)]),  # shut, and opened again
+        ([0.04, 0.0, 0.03], [(0.0, 0.07)]),  # one ends where the next begins
+    ],
+    ids=["long", "lengthened", "shorter", "shut", "joined"],
+)
+def test_a_burn_goes_on_to_its_end(
+    on_times: list[float], spans: list[tuple[float, float]], delay: float
+) -> None:
+    state, impulse, cut = fire(thrusters(burns="to_the_end", delay=delay), on_times, 12)
+    edges = STEP * np.arange(len(impulse) + 1)
+    expected = sum(
+        np.diff(np.clip(edges - begin - delay, 0.0, end - begin)) for begin, end in spans
+    )
+    np.testing.assert_allclose(impulse / FORCE, expected, atol=1e-14)
+    total = sum(end - begin for begin, end in spans)
+    assert state["rcs_on_time"][0, 0] == pytest.approx(total, rel=1e-12)
+    assert not cut.any()
+
+
+def test_a_valve_that_is_shut_stays_open_for_its_least_pulse() -> None:
+    flown = thrusters(burns="to_the_end", minimum_on=0.033, rise=0.004)
+    state, impulse, cut = fire(flown, [0.1, -1.0], 20)
+    assert state["rcs_on_time"][0, 0] == pytest.approx(0.033, rel=1e-12)
+    assert impulse.sum() == pytest.approx(FORCE * 0.033, rel=1e-9)  # the lag loses nothing
+    assert not cut.any()
+    # Too short by itself is told; within a burn it has no effect, and there is nothing to tell.
+    _, _, cut = fire(flown, [0.01, 0.0, 0.1, 0.01], 10)
+    assert cut.tolist() == [1.0] * 4 + [0.0] * 36
+
+
+@given(
+    on_times=st.lists(
+        st.sampled_from([0.0, 0.0, -1.0, 0.004, 0.013, 0.02, 0.05, 0.071]), max_size=12
+    ),
+    delay=st.sampled_from([0.0, 0.0071, 0.02, 0.05]),
+)
+@settings(max_examples=60, deadline=None)
+def test_the_time_that_a_valve_is_open_is_that_of_its_burns(
+    on_times: list[float], delay: float
+) -> None:
+    flown = thrusters(burns="to_the_end", delay=delay)
+    state, impulse, _ = fire(flown, on_times, len(on_times) + 8)
+    spans = burns(on_times)
+    np.testing.assert_allclose(state["rcs_on_time"][0, 0], np.diff(spans).sum(), atol=1e-12)
+    assert impulse.sum() == pytest.approx(FORCE * np.diff(spans).sum(), abs=1e-12)
 
 
 UNLIKE = {

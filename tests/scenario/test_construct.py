@@ -88,7 +88,7 @@ def test_a_gain_of_each_may_be_one_for_all_where_that_is_declared() -> None:
     gains: dict[str, Any] = {"attitude_gain": 1.0, "rate_gain": 1.0}
 
     def shortest(value: Any) -> Any:
-        component = Component(kind="pulsed_pd:PulsedPd", **gains, thruster_minimum_on=value)
+        component = Component(kind="pulsed_pd:PulsedPd", **gains | {"thruster_minimum_on": value})
         kind = Trust(Path()).load_class(component.kind)
         return construct(component, kind, facts, Trust(Path()))[0].thruster_minimum_on
 
