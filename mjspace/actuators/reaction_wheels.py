@@ -245,7 +245,8 @@ class ReactionWheels(Actuator):
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
         """Return what ``motor_torque`` does for a ``TorqueCommand``."""
-        return state, *self.motor_torque(command.torque, truth.wheel_speed, step)
+        speed = truth.wheel_speed[..., : len(self.axes)]  # any in gimbals come after them
+        return state, *self.motor_torque(command.torque, speed, step)
 
     def motor_torque(self, torque: Array, wheel_speed: Array, step: float) -> tuple[Array, Array]:
         """Return (ctrl, saturated), each of shape (..., n), for the next ``step`` [s].
