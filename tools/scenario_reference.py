@@ -148,7 +148,8 @@ def _kind(annotation: Any) -> str:
     if origin is dict:
         return f"table of {_kind(parts[1])}s by name"
     for each in (mark for mark in parts[1:] if isinstance(mark, OneOrEach)):
-        one = _kind(Annotated[each.kind, *(mark for mark in parts[1:] if isinstance(mark, Si))])
+        units = [mark for mark in parts[1:] if isinstance(mark, Si)]
+        one = _kind(Annotated[each.kind, *units] if units else each.kind)
         return f"{one}, or a list with one for each"
     sizes, unit, scalar = _shape(annotation)
     words = {float: "number", int: "whole number", str: "text", bool: "true or false"}

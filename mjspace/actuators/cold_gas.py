@@ -152,7 +152,7 @@ class ColdGasThrusters(Actuator):
         """Return mass and inertia of the tank."""
         return tanks.masses(self.tank, self.full, before["cold_gas"], after["cold_gas"])
 
-    def account_propellant(
+    def account(
         self, state: State, applied: Array, instead: Array, step: float
     ) -> tuple[State, Array]:
         """Return (state, thrust) where faults have made ``instead`` of what ``act`` applied.

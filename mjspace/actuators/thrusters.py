@@ -173,7 +173,7 @@ class Thrusters(Actuator):
         left = np.concatenate([truth.propellant, state["rcs_propellant"]], axis=-1)
         return truth._replace(thrust=thrust, propellant=left)
 
-    def account_propellant(
+    def account(
         self, state: State, applied: Array, instead: Array, step: float
     ) -> tuple[State, Array]:
         """Return (state, thrust) where faults have made ``instead`` of what ``act`` applied.

@@ -121,7 +121,7 @@ def test_unlike_valves_follow_the_equations_of_flow_and_thrust() -> None:
     assert state["cold_gas"][0, 0] / GAS == pytest.approx(solved.y[0, -1], rel=1e-9)
     np.testing.assert_allclose(given.sum(axis=0), thrust * solved.y[1, -1], rtol=1e-9)
     # What a stuck valve spends leaves by its own nozzle.
-    after, _ = flown.account_propellant(flown.reset(1), np.zeros((1, 3)), np.eye(3)[1:2], STEP)
+    after, _ = flown.account(flown.reset(1), np.zeros((1, 3)), np.eye(3)[1:2], STEP)
     spent = STEP / (impulse[1] * STANDARD_GRAVITY)
     assert GAS - after["cold_gas"][0, 0] == pytest.approx(spent, rel=1e-9)
 
@@ -129,12 +129,12 @@ def test_unlike_valves_follow_the_equations_of_flow_and_thrust() -> None:
 def test_what_a_stuck_valve_spends_leaves_the_tank_at_its_exhaust_speed() -> None:
     flown, applied, stuck = thrusters(2, exponent=1.4), np.zeros((1, 2)), np.array([[0.0, 0.5]])
     half = flown.reset(1) | {"cold_gas": np.full((1, 1), 0.5 * GAS)}
-    after, thrust = flown.account_propellant(half, applied, stuck, STEP)
+    after, thrust = flown.account(half, applied, stuck, STEP)
     np.testing.assert_array_equal(thrust, stuck)
     speed = SPEED * 0.5**0.2  # it falls with the root of the temperature, (1/2)^(n - 1)
     assert 0.5 * GAS - after["cold_gas"][0, 0] == pytest.approx(0.5 * STEP / speed, rel=1e-9)
     empty = {"cold_gas": np.zeros((1, 1)), "cold_gas_step": np.zeros((1, 1))}
-    after, thrust = flown.account_propellant(empty, applied, stuck, STEP)
+    after, thrust = flown.account(empty, applied, stuck, STEP)
     assert not thrust.any()
 
 

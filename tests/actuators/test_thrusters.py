@@ -219,7 +219,7 @@ def test_what_a_fault_adds_is_burnt_by_the_flow_of_its_own_thruster() -> None:
     table = Rcs(**layout(3) | UNLIKE, propellant=0.5)
     flown = built(table, "rcs_tank", mass=0.5, inertia=0.01)
     applied, instead = np.array([[1.0, 0.0, 3.0]]), np.array([[1.0, 2.0, 0.0]])
-    after, thrust = flown.account_propellant(flown.reset(1), applied, instead, STEP)
+    after, thrust = flown.account(flown.reset(1), applied, instead, STEP)
     np.testing.assert_array_equal(thrust, instead)
     burnt = STEP * (2.0 / 220.0 - 3.0 / 290.0) / STANDARD_GRAVITY
     assert 0.5 - after["rcs_propellant"][0, 0] == pytest.approx(burnt, abs=1e-15)
