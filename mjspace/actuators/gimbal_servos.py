@@ -65,9 +65,10 @@ class Servos(ActuatorTable, Table):
         """
         reaction_wheels = len(vehicle.wheel_axes)
         spins = vehicle.wheel_dof[reaction_wheels:]
+        turns = vehicle.gimbal_dof[len(vehicle.own.gimbals) :]
         found = {
-            "gimbal_axes": indices.axes(vehicle.model, vehicle.gimbal_dof),
-            "gimbal_inertia": indices.axial_inertia(vehicle.model, vehicle.gimbal_dof),
+            "gimbal_axes": indices.axes(vehicle.model, turns),
+            "gimbal_inertia": indices.axial_inertia(vehicle.model, turns),
             "spin_axes": indices.axes(vehicle.model, spins),
             "spin_inertia": indices.axial_inertia(vehicle.model, spins),
         }
@@ -81,7 +82,11 @@ class Servos(ActuatorTable, Table):
         rows = [gimbal] * len(driven.gimbals) + [wheel] * len(driven.wheels)
         loops = [[np.inf if number is None else number for number in row] for row in rows]
         wheel_speed = np.full(len(driven.wheels), self.wheel_speed or 0.0)
-        before = len(context.vehicle.driven.wheels) - len(driven.wheels)
+        every = context.vehicle.driven
+        before = tuple(
+            len(of_all) - len(its)
+            for of_all, its in ((every.gimbals, driven.gimbals), (every.wheels, driven.wheels))
+        )
         return GimbalServos(np.array(loops), wheel_speed, before, driven=driven)
 
 
@@ -97,8 +102,8 @@ class GimbalServos(HingeMotors):
     """Gain, integral gain, limits of torque and rate of each gimbal, then each wheel; (m, 4)."""
     wheel_speed: Array
     """Desired of each wheel [rad/s], shape (n,)."""
-    wheels_before: int = 0
-    """How many wheels of others come before its own among the vehicle's."""
+    before: tuple[int, ...] = (0, 0)
+    """How many gimbals, and how many wheels, of others come before its own in the truth."""
 
     @property
     def takes(self) -> Fields:
@@ -118,12 +123,14 @@ class GimbalServos(HingeMotors):
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
         """Return (state, torque [N m], whether rate or torque saturates), (N, m), as the motors."""
-        speed = truth.wheel_speed[..., self.wheels_before :]
+        gimbals, wheels = self.before
+        speed = truth.wheel_speed[..., wheels:]
         wheel_speed = np.broadcast_to(self.wheel_speed, speed.shape)
         desired = np.concatenate([command.gimbal_rate, wheel_speed], axis=-1)
-        rate = np.concatenate([truth.gimbal_rate, speed], axis=-1)
-        before = state["servo_integral"]
-        integral, torque, saturated = _hold_speed.ufunc(before, desired, rate, self.loops, step)
+        rate = np.concatenate([truth.gimbal_rate[..., gimbals:], speed], axis=-1)
+        integral, torque, saturated = _hold_speed.ufunc(
+            state["servo_integral"], desired, rate, self.loops, step
+        )
         in_order = torque.take(self.order, axis=-1), saturated.take(self.order, axis=-1)
         return {"servo_integral": integral}, *in_order
 

@@ -107,8 +107,10 @@ def build(
     where = indices.of(model, driven)
     axes, inertia = rotors.axes, rotors.inertia
     if gyrostat is None:
-        axes = indices.axes(model, where["wheel_dof"])
-        inertia = indices.axial_inertia(model, where["wheel_dof"])
+        # Wheels in gimbals, whose axes turn, come after reaction wheels.
+        on_bus_dof = where["wheel_dof"][: len(own.wheels) + len(rotors.axes)]
+        axes = indices.axes(model, on_bus_dof)
+        inertia = indices.axial_inertia(model, on_bus_dof)
         _, _, gyrostat = mass_properties.together(inertials(model).values())
         gyrostat -= axes.T @ (inertia[:, None] * axes)
 
@@ -233,8 +235,7 @@ def driven_by(model: Any, table: PlantTable, own: Driven) -> dict[str, Driven]:
     for key, fitted in table.equipment.items():
         with input_error_at(f"plant.{key}"):
             found[key] = fitted.driven(model)
-    claimed = Driven.together([own, *found.values()]).motors
-    left = [name for name in indices.turned(model) if name not in claimed]
+    left = indices.turned(model, Driven.together([own, *found.values()]).motors)
     for key, fitted in table.equipment.items():
         with input_error_at(f"plant.{key}"):
             found[key] = Driven.together([found[key], fitted.driven_hinges(left)])

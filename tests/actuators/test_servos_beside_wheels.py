@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import own_models
 import pytest
 
 from mjspace.contract import Array
@@ -115,3 +116,24 @@ def test_a_log_is_flown_again_from_the_middle_of_the_slew(tmp_path: Path) -> Non
     path = run("antenna-slew", overrides=quick, out=tmp_path).path
     assert verify(path) is None
     assert verify(path, start=3.0) is None
+
+
+def test_parts_on_a_model_of_ones_own_are_turned_beside_its_own_motors(tmp_path: Path) -> None:
+    """Its own gimbal, wheels and jet obey as before; the servos have the hinge of the part."""
+    path = own_models.write(tmp_path)
+    law = own_models.LAW.replace("control: np.ndarray", "control: np.ndarray\n    gimbal_rate: Any")
+    law = law.replace("force, control)", "0.0 * force, control, np.full((*rows, 1), 0.2))")
+    (tmp_path / "law.py").write_text("from typing import Any\n" + law)
+    antenna = ["plant.parts.dish={part='antenna',position=[0,0,0.3]}", "plant.servos={}"]
+    assembly = assemble(*load(path, antenna))
+    facts = facts_of(assembly.vehicle, assembly.scenario)
+    np.testing.assert_allclose(facts["gimbal_axes"], [[1.0, 0.0, 0.0]])
+    np.testing.assert_allclose(facts["gimbal_inertia"], [0.2])
+    assert len(facts["wheel_axes"]) == 3
+    truth = flown(assembly)["/truth"]
+    angle = truth["gimbal_angle"]
+    assert angle[-1, 1] == pytest.approx(0.4, rel=2e-2)  # after the arm's
+    assert 0.05 < angle[-1, 0] < 0.4  # on its way to 0.3 rad
+    assert (np.abs(truth["wheel_speed"][-1]) > 0.1).all()
+    drift = truth["momentum"] - truth["momentum"][0]
+    assert np.abs(drift).max() < 1e-6
