@@ -100,6 +100,7 @@ def _gain(field: Field[Any]) -> str:
     unit = field.metadata.get("unit", "")
     words = ["any unit" if unit is None else unit]
     words += [field.metadata.get(key, "") for key in ("range", "form")]
+    words += ["one for all or each"] * field.metadata.get("one_for_all", False)
     stated = ", ".join(str(word) for word in words if str(word)).replace("|", "\\|")
     unit = f" ({stated})" if stated else ""
     if field.default_factory is not MISSING:
