@@ -249,7 +249,7 @@ class PulseCommand(NamedTuple):
 
     on_time: Annotated[Array, Unit("s")]
     """For how long each is on, from the beginning of the control period [s], shape (..., n); of the
-    integration step, where an inner loop commands it."""
+    integration step, where an inner loop commands it. A negative one shuts a valve."""
 
 
 class Law(Protocol):
@@ -322,6 +322,7 @@ def gain(
     at_most: float | None = None,
     whole: bool = False,
     form: Form = "",
+    one_for_all: bool = False,
 ) -> Any:
     """Declare a law's or a reference's parameter: its SI unit, array shape and range.
 
@@ -332,19 +333,20 @@ def gain(
     infinity, for a limit that may be absent. ``whole`` admits whole numbers only. ``form`` is what
     the array has to be as a whole: an "inertia" (symmetric, positive definite), or rows that are
     each a "direction" (not zero), a "unit vector" or a "quaternion" (of norm 1 to 1e-3), or
-    "increasing" values.
+    "increasing" values. ``one_for_all`` admits a single number in place of the array.
 
     The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
     constructed in Python. A gain without a default that is named like one of the plant's properties
     (``inertia``, ``wheel_axes``, ``wheel_inertia``; with gimbals that have speed loops
-    ``gimbal_axes`` and ``spin_axes``; with arms ``link_length``, ``link_mass`` and
-    ``link_inertia``), or ``control_period`` or ``inner_period``, may be left out
-    of the table: it is then taken from the vehicle as flown.
+    ``gimbal_axes``, ``gimbal_inertia``, ``spin_axes`` and ``spin_inertia``; with arms
+    ``link_length``, ``link_mass`` and ``link_inertia``), or ``control_period`` or
+    ``inner_period``, may be left out of the table: it is then taken from the vehicle as flown.
     """
     limits = Range(above, at_least, below, at_most, whole)
-    metadata = {"unit": unit, "shape": shape, "range": limits, "form": form}
+    metadata: dict[str, Any] = {"unit": unit, "shape": shape, "range": limits, "form": form}
+    metadata["one_for_all"] = one_for_all
     if default is MISSING:
         return field(metadata=metadata)
-    if shape:
+    if shape and not one_for_all:
         return field(metadata=metadata, default_factory=lambda: np.array(default, dtype=float))
     return field(metadata=metadata, default=default)

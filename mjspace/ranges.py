@@ -107,12 +107,13 @@ def refuse_unfit(
             array = numbers(value)
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
-        extra = of_each_vehicle and array.ndim == len(metadata["shape"]) + 1
+        shape = () if metadata["one_for_all"] and array.ndim == 0 else metadata["shape"]
+        extra = of_each_vehicle and array.ndim == len(shape) + 1
         for one in array if extra else [array]:
-            _refuse_shape(name, one, metadata["shape"])
+            _refuse_shape(name, one, shape)
             _refuse_values(name, one, metadata)
         sized = array.shape[1:] if extra else array.shape
-        for size, along in zip(sized, metadata["shape"], strict=True):
+        for size, along in zip(sized, shape, strict=True):
             if isinstance(along, str):
                 other, count = sizes.setdefault(along, (name, size))
                 if size != count:

@@ -59,6 +59,9 @@ UNITS: dict[str, tuple[str, float]] = {
     "N m s": ("N m s", 1.0),
     "N m s/rad": ("N m s/rad", 1.0),
     "J": ("J", 1.0),
+    "Wh": ("J", 3600.0),
+    "W": ("W", 1.0),
+    "mW": ("W", 1e-3),
     "T": ("T", 1.0),
     "nT": ("T", 1e-9),
     "A m^2": ("A m^2", 1.0),
@@ -76,7 +79,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "V s/rad": ("N m/A", 1.0),
 }
 
-_SYMBOLS = {s for name in UNITS for s in re.split(r"[ /]", re.sub(r"\^\d+", "", name))} | {"1", "W"}
+_SYMBOLS = {s for name in UNITS for s in re.split(r"[ /]", re.sub(r"\^\d+", "", name))} | {"1"}
 _DISPLAYED_IN = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
 
 

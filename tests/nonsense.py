@@ -36,6 +36,7 @@ FACTS: dict[str, Any] = {
     "control_period": 1e-4,
     "inner_period": 1e-4,
     "gimbal_axes": np.eye(3),
+    "gimbal_inertia": np.full(3, 0.2),
     "spin_axes": np.roll(np.eye(3), 1, axis=0),
     "thruster_positions": np.array(_RCS.positions),
     "thruster_directions": np.array(_RCS.unit_directions),

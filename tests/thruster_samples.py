@@ -18,10 +18,10 @@ NOTHING = np.zeros((1, 0))
 TRUTH = Measurement(thrust=NOTHING, propellant=NOTHING)
 
 
-def layout(count: int) -> dict[str, Any]:
-    """Return the keys of so many thrusters that all push along x."""
+def layout(count: int, thrust: Any = FORCE) -> dict[str, Any]:
+    """Return the keys of so many thrusters that all push along x, of one ``thrust`` or of each."""
     rows = {"positions": [[0.0, 0.0, 0.0]] * count, "directions": [[1.0, 0.0, 0.0]] * count}
-    return {**rows, "thrust": FORCE}
+    return {**rows, "thrust": thrust}
 
 
 def built(table: ThrusterTable, tank: str, mass: float, inertia: float) -> Any:

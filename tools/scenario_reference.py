@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from mjspace.scenario.construct import table_of
 from mjspace.scenario.declared import DeclaredIn, tables_in, type_of
 from mjspace.scenario.docstrings import docstrings
-from mjspace.scenario.fields import OneOrEach, Positive, Si
+from mjspace.scenario.fields import OneOrEach, Si
 from mjspace.scenario.scenario import Scenario
 from mjspace.scenario.sensors import KINDS, kinds
 from mjspace.scenario.trust import controllers
@@ -100,6 +100,7 @@ def _gain(field: Field[Any]) -> str:
     unit = field.metadata.get("unit", "")
     words = ["any unit" if unit is None else unit]
     words += [field.metadata.get(key, "") for key in ("range", "form")]
+    words += ["one for all or each"] * field.metadata.get("one_for_all", False)
     stated = ", ".join(str(word) for word in words if str(word)).replace("|", "\\|")
     unit = f" ({stated})" if stated else ""
     if field.default_factory is not MISSING:
@@ -147,8 +148,9 @@ def _kind(annotation: Any) -> str:
         return " or ".join(_kind(part) for part in parts if part is not NoneType)
     if origin is dict:
         return f"table of {_kind(parts[1])}s by name"
-    if any(isinstance(mark, OneOrEach) for mark in parts[1:]):
-        one = _kind(Annotated[Positive, *(mark for mark in parts[1:] if isinstance(mark, Si))])
+    for each in (mark for mark in parts[1:] if isinstance(mark, OneOrEach)):
+        units = [mark for mark in parts[1:] if isinstance(mark, Si)]
+        one = _kind(Annotated[each.kind, *units] if units else each.kind)
         return f"{one}, or a list with one for each"
     sizes, unit, scalar = _shape(annotation)
     words = {float: "number", int: "whole number", str: "text", bool: "true or false"}

@@ -42,12 +42,15 @@ def within(shares: Array) -> tuple[Array, Array]:
     return factor * shares, factor
 
 
-def pulses(shares: Array, carry: Array, period: float, minimum_on: float) -> tuple[Array, Array]:
+def pulses(
+    shares: Array, carry: Array, period: float, minimum_on: Array | float
+) -> tuple[Array, Array]:
     """Return (on-times [s], remainders [s]), each (..., n), for one control period.
 
     Each thruster should be on for its share, at most one, of the ``period`` [s]. ``carry`` (..., n)
-    [s] is the remainder of the last period. On-times below ``minimum_on`` [s], and what exceeds the
-    period, are not fired but carried over, so that the mean is right in the long run.
+    [s] is the remainder of the last period. On-times below ``minimum_on`` [s], of all or (n,), and
+    what exceeds the period, are not fired but carried over, so that the mean is right in the long
+    run.
     """
     due = shares * period + carry
     on_time = np.where(due < minimum_on, 0.0, np.minimum(due, period))

@@ -58,8 +58,10 @@ class PulsedPd(Gains):
     """kp: the stiffness for small angles is half of it."""
     rate_gain: float = gain("N m s/rad", at_least=0.0)
     """kd, the same on each axis."""
-    thruster_minimum_on: float = gain("s", default=0.0, at_least=0.0)
-    """Shorter pulses are not fired but carried over."""
+    thruster_minimum_on: Array | float = gain(
+        "s", ("thruster",), default=0.0, at_least=0.0, one_for_all=True
+    )
+    """Shorter pulses are not fired but carried over; of all, or of each, (n,)."""
     force_weight: float = gain("m", default=1.0, at_least=0.0)
     """Weight of an unwanted net force relative to a torque error; zero ignores the force."""
 

@@ -143,7 +143,7 @@ class Actuator(ABC):
         """
         return {}
 
-    def account_propellant(
+    def account(
         self, state: State, applied: Array, instead: Array, step: float
     ) -> tuple[State, Array]:
         """Return (state, applied) where faults have made ``instead`` of what ``act`` applied."""

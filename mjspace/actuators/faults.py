@@ -207,7 +207,7 @@ class FaultSet:
             changed[:, place.columns] = np.where(in_force[:, None], wrong, right)
             result[place.kind] = changed
         for number, actuator in enumerate(self._kinds):
-            state, result[number] = actuator.account_propellant(
+            state, result[number] = actuator.account(
                 state, applied[number], result[number], self._hold
             )
         return state, tuple(result)

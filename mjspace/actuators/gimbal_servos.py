@@ -1,5 +1,6 @@
 """Speed loops on gimbals and on the wheels in them: rates in, torques on joints out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -23,11 +24,12 @@ from mjspace.vehicle.vehicle import Vehicle
 class Servos(ActuatorTable, Table):
     """Speed loops on every hinge of the parts that has a motor: gimbals alike, and wheels alike.
 
-    A hinge whose name ends in ``wheel`` is a wheel, any other a gimbal. A loop is proportional and
-    integral, and its motor acts against what carries the hinge.
+    Reaction wheels of ``[plant.wheels]`` beside them have motors of their own. A hinge whose name
+    ends in ``wheel`` is a wheel, any other a gimbal. A loop is proportional and integral, and its
+    motor acts against what carries the hinge.
     """
 
-    excludes: ClassVar[tuple[str, ...]] = ("engine", "wheels")
+    excludes: ClassVar[tuple[str, ...]] = ("engine",)
 
     rate_limit: Annotated[Positive, Si("rad/s")] | None = None
     """Fastest rate that a gimbal is commanded; none when left out."""
@@ -37,8 +39,9 @@ class Servos(ActuatorTable, Table):
     """Torque of a gimbal's motor for each rad/s of rate error."""
     integral_gain: Annotated[NonNegative, Si("N m/rad")] = 60.0
     """And for each rad of integrated error."""
-    wheel_speed: Annotated[Finite, Si("rad/s")]
-    """Held, relative to the gimbal; where a wheel starts is ``initial.wheel_speed``."""
+    wheel_speed: Annotated[Finite, Si("rad/s")] | None = None
+    """Held, relative to the gimbal; where a wheel starts is ``initial.wheel_speed``. Required where
+    a hinge is a wheel."""
     wheel_torque_limit: Annotated[Positive, Si("N m")] | None = None
     """Largest torque of a wheel's motor; none when left out."""
     wheel_gain: Annotated[Positive, Si("N m s/rad")] = 0.1
@@ -46,17 +49,30 @@ class Servos(ActuatorTable, Table):
     wheel_integral_gain: Annotated[NonNegative, Si("N m/rad")] = 0.5
     """And for each rad of integrated error."""
 
-    def driven(self, model: Any) -> Driven:
-        """Return every hinge of the parts that a motor turns, but for those of booms."""
-        return gimbals_and_wheels(indices.turned(model))
+    def driven_hinges(self, hinges: Sequence[str]) -> Driven:
+        """Return all of them."""
+        if not hinges:
+            raise ValueError("no hinge of the parts has a motor that nothing else drives")
+        driven = gimbals_and_wheels(hinges)
+        if driven.wheels and self.wheel_speed is None:
+            raise ValueError(f"wheel_speed: missing, and {', '.join(driven.wheels)} is a wheel")
+        return driven
 
     def facts(self, vehicle: Vehicle) -> dict[str, Any]:
-        """Return the axes of gimbals and wheels at rest, and the wheels' axial inertia."""
-        return {
-            "gimbal_axes": indices.axes(vehicle.model, vehicle.gimbal_dof),
-            "spin_axes": indices.axes(vehicle.model, vehicle.wheel_dof),
-            "wheel_inertia": indices.axial_inertia(vehicle.model, vehicle.wheel_dof),
+        """Return the axes of gimbals and of the wheels in them at rest, and the inertia about each.
+
+        ``wheel_inertia`` is that of reaction wheels; where there are none, about the ``spin_axes``.
+        """
+        reaction_wheels = len(vehicle.wheel_axes)
+        spins = vehicle.wheel_dof[reaction_wheels:]
+        turns = vehicle.gimbal_dof[len(vehicle.own.gimbals) :]
+        found = {
+            "gimbal_axes": indices.axes(vehicle.model, turns),
+            "gimbal_inertia": indices.axial_inertia(vehicle.model, turns),
+            "spin_axes": indices.axes(vehicle.model, spins),
+            "spin_inertia": indices.axial_inertia(vehicle.model, spins),
         }
+        return found if reaction_wheels else found | {"wheel_inertia": found["spin_inertia"]}
 
     def actuator(self, context: Context) -> "GimbalServos":
         """Return the loops of a vehicle's driven hinges."""
@@ -65,8 +81,13 @@ class Servos(ActuatorTable, Table):
         driven = context.driven
         rows = [gimbal] * len(driven.gimbals) + [wheel] * len(driven.wheels)
         loops = [[np.inf if number is None else number for number in row] for row in rows]
-        wheel_speed = np.full(len(driven.wheels), self.wheel_speed)
-        return GimbalServos(np.array(loops), wheel_speed, driven=driven)
+        wheel_speed = np.full(len(driven.wheels), self.wheel_speed or 0.0)
+        every = context.vehicle.driven
+        before = tuple(
+            len(of_all) - len(its)
+            for of_all, its in ((every.gimbals, driven.gimbals), (every.wheels, driven.wheels))
+        )
+        return GimbalServos(np.array(loops), wheel_speed, before, driven=driven)
 
 
 @dataclass(frozen=True)
@@ -81,6 +102,8 @@ class GimbalServos(HingeMotors):
     """Gain, integral gain, limits of torque and rate of each gimbal, then each wheel; (m, 4)."""
     wheel_speed: Array
     """Desired of each wheel [rad/s], shape (n,)."""
+    before: tuple[int, ...] = (0, 0)
+    """How many gimbals, and how many wheels, of others come before its own in the truth."""
 
     @property
     def takes(self) -> Fields:
@@ -100,11 +123,14 @@ class GimbalServos(HingeMotors):
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
         """Return (state, torque [N m], whether rate or torque saturates), (N, m), as the motors."""
-        wheel_speed = np.broadcast_to(self.wheel_speed, truth.wheel_speed.shape)
+        gimbals, wheels = self.before
+        speed = truth.wheel_speed[..., wheels:]
+        wheel_speed = np.broadcast_to(self.wheel_speed, speed.shape)
         desired = np.concatenate([command.gimbal_rate, wheel_speed], axis=-1)
-        rate = np.concatenate([truth.gimbal_rate, truth.wheel_speed], axis=-1)
-        before = state["servo_integral"]
-        integral, torque, saturated = _hold_speed.ufunc(before, desired, rate, self.loops, step)
+        rate = np.concatenate([truth.gimbal_rate[..., gimbals:], speed], axis=-1)
+        integral, torque, saturated = _hold_speed.ufunc(
+            state["servo_integral"], desired, rate, self.loops, step
+        )
         in_order = torque.take(self.order, axis=-1), saturated.take(self.order, axis=-1)
         return {"servo_integral": integral}, *in_order
 

@@ -1,5 +1,6 @@
 """Electric motors on hinges, as the actuators of a vehicle: voltages in, torques on joints out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -17,7 +18,6 @@ from mjspace.actuators.pmsm import Drives, Pmsm
 from mjspace.contract import Array, Measurement
 from mjspace.scenario.equipment import Driven
 from mjspace.scenario.fields import Name
-from mjspace.vehicle import indices
 
 
 class DriveTables(ActuatorTable, RootModel[dict[Name, Pmsm]]):
@@ -31,17 +31,16 @@ class DriveTables(ActuatorTable, RootModel[dict[Name, Pmsm]]):
         """Whether there are any."""
         return bool(self.root)
 
-    def driven(self, model: Any) -> Driven:
-        """Return the motors in the order of ``ctrl``; each hinge with a motor has its drive."""
-        turned = indices.turned(model)
+    def driven_hinges(self, hinges: Sequence[str]) -> Driven:
+        """Return all of them; each has its drive."""
         for name in self.root:
-            if name not in turned:
+            if name not in hinges:
                 raise ValueError(
-                    f"plant.drives.{name}: no motor turns it: have {', '.join(turned)}"
+                    f"plant.drives.{name}: no motor turns it: have {', '.join(hinges)}"
                 )
-        if left := set(turned).difference(self.root):
+        if left := set(hinges).difference(self.root):
             raise ValueError(f"plant.drives: {', '.join(sorted(left))} has a motor and no drive")
-        return gimbals_and_wheels(turned)
+        return gimbals_and_wheels(hinges)
 
     def actuator(self, context: Context) -> "MotorDrives":
         """Return the drives of a vehicle's driven hinges."""

@@ -19,10 +19,19 @@ from mjspace.actuators.base import (
     motors,
     together,
 )
-from mjspace.actuators.wheel_torques import motor_torques
+from mjspace.actuators.wheel_power import PowerKeys, PowerModel
+from mjspace.actuators.wheel_torques import motor_torques, spare, unreachable
 from mjspace.contract import Array, Measurement
 from mjspace.scenario.equipment import Driven
-from mjspace.scenario.fields import Each, Meters3, Si, Unit3, of_each, refuse_other_count
+from mjspace.scenario.fields import (
+    Each,
+    Meters3,
+    Si,
+    Switch,
+    Unit3,
+    of_each,
+    refuse_other_count,
+)
 from mjspace.scenario.hinges import Bearing, Friction
 from mjspace.vehicle import mass_properties, model_checks, stability
 from mjspace.vehicle.composition import ASSETS, bus_of
@@ -30,7 +39,7 @@ from mjspace.vehicle.composition import ASSETS, bus_of
 _GAP = 0.1  # m, between the hull and the centre of a wheel drawn outside it
 
 
-class Wheels(ActuatorTable, Bearing):
+class Wheels(ActuatorTable, PowerKeys, Bearing):
     """Reaction wheels: one for each axis, alike but for what is a list with a number for each."""
 
     cure: ClassVar[str] = "set wheels.axes = [] to fly without wheels"
@@ -50,6 +59,9 @@ class Wheels(ActuatorTable, Bearing):
     """Largest motor torque; none when left out."""
     speed_limit: Annotated[Each, Si("rad/s")] | None = None
     """Largest speed relative to the bus; at it the motor gives no torque that would raise it."""
+    momentum_margin: Switch = False
+    """Whether the log has ``truth.wheel_momentum_margin``, (speed limit - |speed|) inertia of each;
+    needs ``speed_limit``."""
     allocation: Literal["least_squares", "least_peak"] = "least_squares"
     """Of all motor torques that make the commanded one, those of least norm, or those whose largest
     is least; the latter for one wheel more than the axes span, such as four in a pyramid."""
@@ -60,8 +72,11 @@ class Wheels(ActuatorTable, Bearing):
             raise ValueError(
                 f"positions: {len(self.positions)} rows for {len(self.axes)} axes: give as many"
             )
-        for key in ("inertia", "transverse_inertia", "mass", "torque_limit", "speed_limit"):
+        of_rotors = "inertia", "transverse_inertia", "mass", "torque_limit", "speed_limit"
+        for key in (*of_rotors, *PowerKeys.model_fields):
             refuse_other_count(key, getattr(self, key), len(self.axes), "axes")
+        if self.momentum_margin and self.speed_limit is None:
+            raise ValueError("momentum_margin: needs speed_limit, which is missing")
         return self
 
     @property
@@ -113,7 +128,14 @@ class Wheels(ActuatorTable, Bearing):
         vehicle = context.vehicle
         inertia = stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[: len(self.axes)]]
         limits = self.torque_limit or inf, self.speed_limit or inf
-        wheels = ReactionWheels(vehicle.wheel_axes, *limits, self.allocation, inertia)
+        wheels = ReactionWheels(
+            vehicle.wheel_axes,
+            *limits,
+            self.allocation,
+            inertia,
+            power=self.power_model(inertia),
+            reserve=self.rotors.inertia if self.momentum_margin else None,
+        )
         if context.alone:
             wheels.warn_of_unreachable("plant.wheels.axes")
         return wheels
@@ -196,9 +218,18 @@ class ReactionWheels(Actuator):
     used by the speed limit alone."""
     names: tuple[str, ...] = ()
     """Of their motors; ``wheel_0``, ... when left out."""
+    power: PowerModel | None = None
+    """What they take from the bus; None: it is not computed."""
+    reserve: Array | None = None
+    """Axial inertia of each rotor [kg m^2], (n,), for the margin of momentum; None: not logged."""
     logged_as: ClassVar[str] = "wheel_torque"
     unit: ClassVar[str] = "N m"
     takes: ClassVar[Fields] = {"torque": (3, "N m")}
+    measures: ClassVar[dict[str, str]] = {
+        "wheel_power": "W",
+        "wheel_energy": "J",
+        "wheel_momentum_margin": "N m s",
+    }
     allocation: Array = field(init=False, repr=False)
     """Motor torques for each unit of torque on the bus, shape (n, 3): -pinv(axes^T)."""
     spare: Array = field(init=False, repr=False)
@@ -216,8 +247,10 @@ class ReactionWheels(Actuator):
             )
         derived = {
             "allocation": -np.linalg.pinv(self.axes.T),
-            "spare": self._spare(),
-            "unreachable": self._unreachable(),
+            "spare": (
+                spare(self.axes) if self.shared_by == "least_peak" else np.zeros(len(self.axes))
+            ),
+            "unreachable": unreachable(self.axes),
             "inertia": self.inertia if len(self.inertia) else np.ones(len(self.axes)),
             "names": self.names or _names(len(self.axes)),
             "_torque_limits": of_each(self.torque_limit, len(self.axes)),
@@ -228,8 +261,8 @@ class ReactionWheels(Actuator):
 
     @property
     def stateful(self) -> bool:
-        """Whether they act in every integration step: a speed limit does."""
-        return bool(np.isfinite(self.speed_limit).any())
+        """Whether they act in every integration step: for a speed limit, or to add up energy."""
+        return self.power is not None or bool(np.isfinite(self.speed_limit).any())
 
     @property
     def drives(self) -> Input:
@@ -241,11 +274,37 @@ class ReactionWheels(Actuator):
         largest = together(self.axes, self._torque_limits)
         return {"torque": (-largest, largest)}
 
+    def reset(self, vehicles: int) -> State:
+        """Return what adds up their energy, where power is computed: ``PowerModel.reset``."""
+        return {} if self.power is None else self.power.reset(vehicles)
+
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
-        """Return what ``motor_torque`` does for a ``TorqueCommand``."""
-        return state, *self.motor_torque(command.torque, truth.wheel_speed, step)
+        """Return what ``motor_torque`` does for a ``TorqueCommand``, within limits of power."""
+        speed = truth.wheel_speed[..., : len(self.axes)]  # any in gimbals come after them
+        torque, saturated = self.motor_torque(command.torque, speed, step)
+        if self.power is None:
+            return state, torque, saturated
+        held, within = self.power.drive(state, torque, speed, step)
+        return held, within, np.where(within != torque, 1.0, saturated)
+
+    def measured(self, state: State, truth: Measurement) -> Measurement:
+        """Return the truth with electrical power and energy, and the margin of momentum."""
+        speed = truth.wheel_speed[..., : len(self.axes)]
+        if self.power is not None:
+            power, energy = self.power.used(state, speed)
+            truth = truth._replace(wheel_power=power, wheel_energy=energy)
+        if self.reserve is not None:
+            margin = (self._speed_limits - np.abs(speed)) * self.reserve
+            truth = truth._replace(wheel_momentum_margin=margin)
+        return truth
+
+    def account(
+        self, state: State, applied: Array, instead: Array, step: float
+    ) -> tuple[State, Array]:
+        """Return (state, torque): power is that of the torque that faults have left."""
+        return (state if self.power is None else self.power.account(state, instead)), instead
 
     def motor_torque(self, torque: Array, wheel_speed: Array, step: float) -> tuple[Array, Array]:
         """Return (ctrl, saturated), each of shape (..., n), for the next ``step`` [s].
@@ -286,27 +345,3 @@ class ReactionWheels(Actuator):
             model_checks.ModelWarning,
             stacklevel=3,
         )
-
-    def _unreachable(self) -> Array:
-        """Return ``unreachable``; none for a vehicle without wheels, on which nothing relies."""
-        if not len(self.axes):
-            return np.zeros((0, 3))
-        _, singular, right = np.linalg.svd(self.axes)
-        missing = right[int(np.sum(singular > 1e-9)) :]
-        largest = np.take_along_axis(missing, np.abs(missing).argmax(axis=1)[:, None], axis=1)
-        found: Array = missing * np.sign(largest)
-        return found
-
-    def _spare(self) -> Array:
-        """Return ``spare``; ValueError where least peak has no choice, or more than one number."""
-        if self.shared_by == "least_squares":
-            return np.zeros(len(self.axes))
-        _, singular, right = np.linalg.svd(self.axes.T)
-        free = len(self.axes) - int(np.sum(singular > 1e-9))
-        if free != 1:
-            raise ValueError(
-                f"plant.wheels.allocation: least_peak needs one wheel more than their axes span, "
-                f"as four of a pyramid are; here it is {free} more: use least_squares"
-            )
-        one: Array = right[-1]
-        return np.where(np.abs(one) < 1e-12, 0.0, one)

@@ -1,14 +1,24 @@
 """Where on/off thrusters are and which way they push: what the tables of all kinds have."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import mujoco
 import numpy as np
 from pydantic import Field, model_validator
 
 from mjspace.actuators.base import ActuatorTable
+from mjspace.contract import Array
 from mjspace.scenario.equipment import Driven
-from mjspace.scenario.fields import Meters3, Positive, Si, Table, Time, Unit3
+from mjspace.scenario.fields import (
+    Each,
+    EachNonNegative,
+    Meters3,
+    Si,
+    Table,
+    Unit3,
+    of_each,
+    refuse_other_count,
+)
 from mjspace.vehicle.composition import bus_of
 from mjspace.vehicle.vehicle import Vehicle
 
@@ -21,24 +31,33 @@ _NOZZLE_AND_PLUME = (
 
 
 class ThrusterTable(ActuatorTable, Table):
-    """Base of the tables of on/off thrusters that are all alike."""
+    """Base of on/off thrusters' tables: alike but for what is a list with a number for each."""
+
+    each: ClassVar[tuple[str, ...]] = ("thrust", "minimum_on")
+    """The keys that may be such lists."""
 
     positions: Annotated[list[Meters3], Field(min_length=1)]
     """Where each pushes, body axes."""
     directions: list[Unit3]
     """Of each one's force on the vehicle, body axes; normalized."""
-    thrust: Annotated[Positive, Si("N")]
+    thrust: Annotated[Each, Si("N")]
     """Of each, steady."""
-    minimum_on: Time = 0.0
+    minimum_on: Annotated[EachNonNegative, Si("s")] = 0.0
     """A valve that opens stays open at least that long, even if commanded for less."""
+    burns: Literal["within_period", "to_the_end"] = "within_period"
+    """What is left of an on-time at the end of its control period: cut off; or burnt in the periods
+    that follow, in which a longer on-time lengthens the burn, a shorter one or zero leaves it, and
+    a negative one shuts the valve."""
 
     @model_validator(mode="after")
-    def _a_direction_for_each(self) -> Self:
+    def _one_for_each(self) -> Self:
         if len(self.directions) != len(self.positions):
             raise ValueError(
                 f"directions: {len(self.directions)} rows for {len(self.positions)} positions: "
                 "give as many"
             )
+        for key in self.each:
+            refuse_other_count(key, getattr(self, key), len(self.positions), "positions")
         return self
 
     @property
@@ -47,6 +66,15 @@ class ThrusterTable(ActuatorTable, Table):
         rows = np.array(self.directions)
         unit: list[list[float]] = (rows / np.linalg.norm(rows, axis=1, keepdims=True)).tolist()
         return unit
+
+    @property
+    def to_the_end(self) -> float:
+        """Whether a burn may be longer than a control period, 1.0 or 0.0, as kernels read it."""
+        return float(self.burns == "to_the_end")
+
+    def of_each(self, key: str) -> Array:
+        """Return the numbers of each thruster under a ``key``, shape (n,)."""
+        return of_each(getattr(self, key), len(self.positions))
 
     def attach(self, spec: Any) -> None:
         """Add a site, a motor, a nozzle and a plume for each thruster."""
@@ -60,12 +88,16 @@ class ThrusterTable(ActuatorTable, Table):
         return Driven(motors=names(len(self.positions)))
 
     def facts(self, vehicle: Vehicle) -> dict[str, Any]:
-        """Return where each thruster pushes and how, its force [N] and its shortest pulse [s]."""
+        """Return where each thruster pushes and how, its force [N] and its shortest pulse [s].
+
+        The shortest pulse is one number where it is that of all.
+        """
+        shortest = self.minimum_on
         return {
             "thruster_positions": np.array(self.positions),
             "thruster_directions": np.array(self.unit_directions),
-            "thruster_force": np.full(len(self.positions), self.thrust),
-            "thruster_minimum_on": self.minimum_on,
+            "thruster_force": self.of_each("thrust"),
+            "thruster_minimum_on": np.array(shortest) if isinstance(shortest, list) else shortest,
         }
 
 

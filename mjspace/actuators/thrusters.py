@@ -20,7 +20,7 @@ from mjspace.actuators.thruster_layout import ThrusterTable, names
 from mjspace.contract import Array, Measurement
 from mjspace.environment.constants import STANDARD_GRAVITY
 from mjspace.gufunc import gufunc
-from mjspace.scenario.fields import Positive, Seconds, Si, Time
+from mjspace.scenario.fields import Each, EachNonNegative, Positive, Si
 
 FIELDS = ("rcs_thrust", "rcs_open", "rcs_on_time", "rcs_asked", "rcs_step", "rcs_propellant")
 _ROUNDING = 1e-12
@@ -29,17 +29,23 @@ _HYDRAZINE = 1010.0  # kg/m^3 at 20 deg C
 
 
 class Rcs(ThrusterTable):
-    """On/off thrusters that are all alike, one for each row of ``positions``.
+    """On/off thrusters, one for each row of ``positions``.
 
-    Their command is an ``on_time`` for each, of the control period that begins. Propellant is in a
-    spherical tank at the body origin, full of hydrazine at first; it loses mass and keeps its size.
+    They are alike but for what is a list with a number for each. Their command is an ``on_time``
+    for each, from the beginning of the control period. Propellant is in a spherical tank at the
+    body origin, full of hydrazine at first; it loses mass and keeps its size.
     """
 
-    delay: Time = 0.0
+    each: ClassVar[tuple[str, ...]] = (
+        *ThrusterTable.each,
+        *("delay", "rise", "specific_impulse"),
+    )
+
+    delay: Annotated[EachNonNegative, Si("s")] = 0.0
     """From the command to the valve, for opening and closing alike."""
-    rise: Time = 0.0
+    rise: Annotated[EachNonNegative, Si("s")] = 0.0
     """Time constant with which the thrust follows its valve."""
-    specific_impulse: Seconds | None = None
+    specific_impulse: Annotated[Each, Si("s")] | None = None
     """Thrust over the weight of the propellant's flow, on Earth; burns nothing when left out."""
     propellant: Annotated[Positive, Si("kg")] | None = None
     """In the tank at the start; goes with ``specific_impulse``."""
@@ -61,16 +67,17 @@ class Rcs(ThrusterTable):
         """Return the thrusters of a vehicle that was composed with them."""
         rates = context.rates
         period, steps = (rates.physics, 1) if context.inner else (rates.control, rates.steps)
-        flow, tank, full = 0.0, 0, np.zeros(3)
+        flow, tank, full = np.zeros(len(self.positions)), 0, np.zeros(3)
         if self.specific_impulse is not None:
             model = context.vehicle.model
-            flow = 1.0 / (self.specific_impulse * STANDARD_GRAVITY)
+            flow = 1.0 / (self.of_each("specific_impulse") * STANDARD_GRAVITY)
             tank = model.body("rcs_tank").id
             full = model.body_inertia[tank] / self.propellant
-        valve = [self.minimum_on, self.delay, self.rise]
-        data = np.array([self.thrust, flow, *valve, period, float(steps)])
-        memory = 1 + ceil(self.delay / period - 1e-9)
-        return Thrusters(data, len(self.positions), memory, tank, full, self.propellant or 0.0)
+        valve = [self.of_each(key) for key in ("minimum_on", "delay", "rise")]
+        each = np.stack([self.of_each("thrust"), flow, *valve], axis=-1)
+        memory = 1 + ceil(np.max(self.delay) / period - 1e-9)
+        timing = np.array([period, float(steps), self.to_the_end])
+        return Thrusters(each, timing, memory, tank, full, self.propellant or 0.0)
 
 
 @dataclass(frozen=True)
@@ -78,14 +85,18 @@ class Thrusters(Actuator):
     """On/off thrusters that obey a ``PulseCommand``.
 
     A pulse begins a ``delay`` after its control period does, or the integration step for which an
-    inner loop commands it; one that lasts its whole period joins the next. A valve that has opened
+    inner loop commands it; one that lasts its whole period joins the next, and what is longer is
+    cut, or goes on into the next. A valve that has opened
     stays open for ``minimum_on``: a shorter command is lengthened and not dropped. Each integration
     step has the impulse that valve and lag give it, exactly.
     """
 
-    data: Array
-    """The thrusters' numbers, in the order that the kernel reads them."""
-    count: int
+    each: Array
+    """Thrust [N], flow of propellant for each newton [kg/s/N], least on-time, delay and time
+    constant [s] of each thruster, shape (n, 5)."""
+    timing: Array
+    """How long a command holds [s], of how many integration steps that is, and whether a burn may
+    be longer (1.0), shape (3,)."""
     memory: int
     """How many commands may still be on their way to the valves."""
     tank: int
@@ -99,6 +110,11 @@ class Thrusters(Actuator):
     unit: ClassVar[str] = "N"
     measures: ClassVar[dict[str, str]] = {"thrust": "N", "propellant": "kg"}
     stateful: ClassVar[bool] = True
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.each)
 
     @property
     def drives(self) -> Input:
@@ -115,8 +131,9 @@ class Thrusters(Actuator):
 
         The fields: "rcs_thrust" [N], "rcs_open" [s] (for how long each valve has been open, zero
         for a closed one) and "rcs_on_time" [s] (how long it has been since the start), each (N, n);
-        "rcs_asked" [s], (N, n, periods), the newest on-times first; "rcs_step" (N, 1), integration
-        steps since the control period began; "rcs_propellant" [kg], (N, 1).
+        "rcs_asked" [s], (N, n, periods), the newest on-times first, each at least what was left of
+        the one before where burns go on; "rcs_step" (N, 1), integration steps since the control
+        period began; "rcs_propellant" [kg], (N, 1).
         """
         none = np.zeros((vehicles, self.count))
         return {
@@ -129,19 +146,23 @@ class Thrusters(Actuator):
         }
 
     def limits(self) -> dict[str, tuple[Array, Array]]:
-        """Return on-times from none to the whole period of a command."""
-        return {"on_time": (np.zeros(self.count), np.full(self.count, self.data[5]))}
+        """Return on-times from none to the whole period of a command; any where burns go on."""
+        if self.timing[2]:
+            return super().limits()
+        return {"on_time": (np.zeros(self.count), np.full(self.count, self.timing[0]))}
 
     def act(
         self, state: State, command: Any, truth: Measurement, step: float
     ) -> tuple[State, Array, Array]:
         """Return (state, mean thrust [N], saturated), (N, n).
 
-        A thruster is saturated when its on-time is no part of the control period or shorter than
-        the least pulse, or when its tank is empty.
+        A thruster is saturated when its on-time is no part of the control period, where it has to
+        be one, or shorter than the least pulse, or when its tank is empty.
         """
         before = (state[name] for name in FIELDS)
-        *after, mean, saturated = _pulse.ufunc(*before, command.on_time, self.data, step)
+        *after, mean, saturated = _pulse.ufunc(
+            *before, command.on_time, self.each, self.timing, step
+        )
         return dict(zip(FIELDS, after, strict=True)), mean, saturated
 
     def measured(self, state: State, truth: Measurement) -> Measurement:
@@ -152,17 +173,19 @@ class Thrusters(Actuator):
         left = np.concatenate([truth.propellant, state["rcs_propellant"]], axis=-1)
         return truth._replace(thrust=thrust, propellant=left)
 
-    def account_propellant(
+    def account(
         self, state: State, applied: Array, instead: Array, step: float
     ) -> tuple[State, Array]:
         """Return (state, thrust) where faults have made ``instead`` of what ``act`` applied.
 
         What is fired is burnt, and an empty tank fires nothing.
         """
-        left, flow = state["rcs_propellant"], self.data[1]
-        if flow:
+        left, flow = state["rcs_propellant"], self.each[:, 1]
+        if self.tank:
             instead = np.where(left > 0.0, instead, 0.0)
-            burnt = flow * step * np.sum(instead - applied, axis=-1, keepdims=True)
+            # In units of the first's flow, which is exact for thrusters that are alike.
+            more = flow / flow[0] * (instead - applied)
+            burnt = flow[0] * step * np.sum(more, axis=-1, keepdims=True)
             state = state | {"rcs_propellant": np.maximum(left - burnt, 0.0)}
         return state, instead
 
@@ -176,10 +199,10 @@ class Thrusters(Actuator):
 
 @gufunc(
     [
-        "void(f8[:],f8[:],f8[:],f8[:,:],f8[:],f8[:],f8[:],f8[:],f8,"
+        "void(f8[:],f8[:],f8[:],f8[:,:],f8[:],f8[:],f8[:],f8[:,:],f8[:],f8,"
         "f8[:],f8[:],f8[:],f8[:,:],f8[:],f8[:],f8[:],f8[:])"
     ],
-    "(n),(n),(n),(n,k),(o),(o),(n),(d),()->(n),(n),(n),(n,k),(o),(o),(n),(n)",
+    "(n),(n),(n),(n,k),(o),(o),(n),(n,d),(p),()->(n),(n),(n),(n,k),(o),(o),(n),(n)",
 )
 def _pulse(
     thrust: Any,
@@ -189,7 +212,8 @@ def _pulse(
     count: Any,
     tank: Any,
     command: Any,
-    data: Any,
+    each: Any,
+    timing: Any,
     step: Any,
     thrust_after: Any,
     opened_after: Any,
@@ -201,17 +225,24 @@ def _pulse(
     saturated: Any,
 ) -> None:
     """Advance valves, thrust and tank by ``step`` [s]; compute each thruster's mean thrust [N]."""
-    force, flow, least, delay, lag, period, steps = data
-    dry = flow > 0.0 and tank[0] <= 0.0
+    period, steps, to_the_end = timing
     elapsed = count[0] * step
     burnt = 0.0
     for i in range(thrust.size):
+        force, flow, least, delay, lag = each[i]
+        dry = flow > 0.0 and tank[0] <= 0.0
         commanded_after[i] = commanded[i]
         if count[0] == 0.0:
             commanded_after[i, 1:] = commanded[i, :-1]
-            commanded_after[i, 0] = min(max(command[i], 0.0), period)
-        short = 0.0 < command[i] < least - _ROUNDING
+            newest = min(max(command[i], 0.0), period)
+            if to_the_end > 0.0:
+                left = commanded[i, 0] - period if command[i] >= 0.0 else 0.0
+                newest = max(command[i], left, 0.0)
+            commanded_after[i, 0] = newest
+        # Of burns that go on, a shorter command than what is left has no effect.
+        short = 0.0 < command[i] < least - _ROUNDING and commanded_after[i, 0] <= command[i]
         beyond = command[i] < 0.0 or command[i] > period + _ROUNDING
+        beyond = beyond and to_the_end == 0.0
         saturated[i] = 1.0 if short or beyond or (dry and command[i] > 0.0) else 0.0
 
         now, impulse, open_for, on = 0.0, 0.0, opened[i], on_time[i]
@@ -221,7 +252,7 @@ def _pulse(
             is_open, until = False, step
             for k in range(commanded.shape[1]):
                 start = delay - elapsed - k * period
-                stop = start + commanded_after[i, k]
+                stop = start + min(commanded_after[i, k], period)
                 if start - _ROUNDING <= now < stop - _ROUNDING:
                     is_open = True
                     until = min(until, stop)
@@ -244,7 +275,7 @@ def _pulse(
         thrust_after[i], opened_after[i], on_time_after[i] = flowing, open_for, on
         mean[i] = impulse / step
         burnt += flow * impulse
-    if burnt > tank[0] and flow > 0.0:
+    if burnt > tank[0]:
         mean *= tank[0] / burnt  # the tank runs dry within the step
     tank_after[0] = max(tank[0] - burnt, 0.0)
     count_after[0] = 0.0 if count[0] + 1.0 >= steps else count[0] + 1.0

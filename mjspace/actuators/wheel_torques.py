@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from mjspace.contract import Array
 from mjspace.gufunc import gufunc
 
 _MISSED = 1e-9, 1e-12
@@ -68,3 +69,34 @@ def motor_torques(
             applied = least if applied < least else most if applied > most else applied
         ctrl[i] = applied
         saturated[i] = 1.0 if applied != desired or beyond else 0.0
+
+
+def unreachable(axes: Array) -> Array:
+    """Return unit vectors about which wheels with unit ``axes`` (n, 3) give no torque.
+
+    Their shape is (3 - rank, 3). None for a vehicle without wheels, on which nothing relies.
+    """
+    if not len(axes):
+        return np.zeros((0, 3))
+    _, singular, right = np.linalg.svd(axes)
+    missing = right[int(np.sum(singular > 1e-9)) :]
+    largest = np.take_along_axis(missing, np.abs(missing).argmax(axis=1)[:, None], axis=1)
+    found: Array = missing * np.sign(largest)
+    return found
+
+
+def spare(axes: Array) -> Array:
+    """Return motor torques (n,) whose sum on the bus is zero, of wheels with unit ``axes`` (n, 3).
+
+    Raises:
+        ValueError: there are none, or more than one number to choose.
+    """
+    _, singular, right = np.linalg.svd(axes.T)
+    free = len(axes) - int(np.sum(singular > 1e-9))
+    if free != 1:
+        raise ValueError(
+            f"plant.wheels.allocation: least_peak needs one wheel more than their axes span, "
+            f"as four of a pyramid are; here it is {free} more: use least_squares"
+        )
+    one: Array = right[-1]
+    return np.where(np.abs(one) < 1e-12, 0.0, one)

@@ -31,6 +31,14 @@ class DerivedTruth:
     """Total angular momentum about the centre of mass, inertial axes, shape (3,)."""
     energy: Annotated[Array, Unit("J")]
     """Kinetic energy, shape (1,)."""
+    wheel_power: Annotated[Array, Unit("W")]
+    """Electrical power of each reaction wheel, at the end of the integration step that ends then,
+    shape (n,); where ``plant.wheels.efficiency`` is given."""
+    wheel_energy: Annotated[Array, Unit("J")]
+    """Electrical energy of each reaction wheel since the start, shape (n,); likewise."""
+    wheel_momentum_margin: Annotated[Array, Unit("N m s")]
+    """What each reaction wheel can still take up of momentum before its speed limit, shape (n,);
+    where ``plant.wheels.momentum_margin`` is set."""
     foot_force: Annotated[Array, Unit("N")]
     """Magnitude of the ground's force on each foot, shape (f,)."""
     hull_force: Annotated[Array, Unit("N")]

@@ -71,6 +71,9 @@ STANDARD = (
     Panel("Gimbal angle", "/truth", "gimbal_angle"),
     Panel("Gimbal rate", "/truth", "gimbal_rate", desired=("/command", "gimbal_rate")),
     Panel("Wheel speed", "/truth", "wheel_speed"),
+    Panel("Momentum margin of wheels", "/truth", "wheel_momentum_margin"),
+    Panel("Electrical power of wheels", "/truth", "wheel_power"),
+    Panel("Electrical energy of wheels", "/truth", "wheel_energy"),
     Panel("Change of total momentum", "/truth", "momentum", log_scale=True, drift=True),
     Panel("Disturbance torque about the centre of mass", "/disturbance", "torque", names="xyz"),
 )

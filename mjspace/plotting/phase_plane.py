@@ -48,9 +48,8 @@ def figure(log: Log, x: str, y: str) -> Figure:
     """
     places = [_component(log, signal) for signal in (x, y)]
     fields = [(topic, field) for topic, field, _ in places]
-    has_thrusters = bool(log.topics.get("/command", {}).get("on_time"))
-    if has_thrusters:
-        fields.append(("/command", "on_time"))
+    pulses = {"on_time", "thruster_thrust"} & log.topics.get("/command", {}).keys()
+    fields += [("/command", field) for field in pulses]
     rows = _together(log.read_topics(by_topic(fields)))
     (across, x_label), (up, y_label) = (
         _values(log, rows, signal, place) for signal, place in zip((x, y), places, strict=True)
@@ -62,8 +61,10 @@ def figure(log: Log, x: str, y: str) -> Figure:
     axes.axhline(0.0, color=FAINT, lw=0.7, zorder=1)
     axes.axvline(0.0, color=FAINT, lw=0.7, zorder=1)
     axes.plot(across, up, color=FAINT, lw=1.1, zorder=2, label="coast")
-    if has_thrusters:
-        _show_thrusters(axes, across, up, rows["/command"]["on_time"] > 0.0)
+    if pulses:
+        # One that is to be on, or a burn that goes on.
+        firing = [rows["/command"][field] > 0.0 for field in pulses]
+        _show_thrusters(axes, across, up, np.logical_or.reduce(firing))
     _show_direction(axes, across, up)
     axes.plot(across[:1], up[:1], "o", color=INK, mfc="white", ms=6.5, zorder=6, label="start")
     axes.plot(across[-1:], up[-1:], "s", color=INK, ms=5.0, zorder=6, label="end")

@@ -119,23 +119,32 @@ def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Itera
     scenario = scenario_of(log)
     stage = Stage(_model(log, scenario), camera, scenario.environment.orbit)
     left = scenario.name, scenario.law.kind
-    pulses: Iterable[Array | None] = repeat(None, len(times))
-    if "on_time" in log.topics.get("/command", {}):
-        pulses = nearest_rows(log, "/command", "on_time", times)
     with Canvas(stage.model, size) as canvas:
-        for time, physics, desired, on_time, thrust, caption in zip(
+        for time, physics, desired, pulses, thrust, caption in zip(
             times,
             nearest_rows(log, "/state", "physics", times),
             nearest_rows(log, "/reference", "attitude", times),
-            pulses,
+            _pulses(log, times),
             shares_of_thrust(log, scenario.plant.engine, times),
             captions(log, times),
             strict=True,
         ):
-            stage.set(float(time), physics, desired, on_time, thrust)
+            stage.set(float(time), physics, desired, pulses, thrust)
             frame = canvas.draw(stage.scene)
             overlay.write(frame, left, (f"{time:.2f} s", caption))
             yield frame
+
+
+def _pulses(log: Log, times: Array) -> Iterable[Array | None]:
+    """Yield what is above zero for each thruster that is on: its on-time, or thrust that goes on.
+
+    None for a vehicle without any.
+    """
+    fields = {"on_time", "thruster_thrust"} & log.topics.get("/command", {}).keys()
+    if not fields:
+        return repeat(None, len(times))
+    each = (nearest_rows(log, "/command", field, times) for field in sorted(fields))
+    return (np.maximum.reduce(rows) for rows in zip(*each, strict=True))
 
 
 def _model(log: Log, scenario: Scenario) -> Any:

@@ -61,13 +61,13 @@ class Stage:
         time: float,
         physics: Array,
         desired: Array,
-        on_time: Array | None = None,
+        pulses: Array | None = None,
         thrust: float = 0.0,
     ) -> Array:
         """Set the scene to ``time`` [s] and return the attitude (4,) of the bus.
 
         ``physics`` is a row of MuJoCo's integration state, ``desired`` the desired attitude (4,).
-        Thrusters with an ``on_time`` (n,) above zero have a plume. ``thrust`` is the engine's share
+        Thrusters with ``pulses`` (n,) above zero have a plume. ``thrust`` is the engine's share
         of its largest thrust, 0 to 1.
         """
         model, data = self.model, self._data
@@ -75,8 +75,8 @@ class Stage:
         self._turn_rotors()
         if self._orbit is not None and self._planet >= 0:
             self._turn_planet(orbit_position(self._orbit, time))
-        if on_time is not None:
-            model.geom_rgba[self._plumes, 3] = _PLUME * (on_time > 0.0)
+        if pulses is not None:
+            model.geom_rgba[self._plumes, 3] = _PLUME * (pulses > 0.0)
         self._plume.burn(thrust, self._option)
         mujoco.mj_fwdPosition(model, data)
         everything = mujoco.mjtCatBit.mjCAT_ALL.value

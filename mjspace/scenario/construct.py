@@ -184,7 +184,7 @@ def _in_si(name: str, value: Any, declared: Mapping[str, Any]) -> Any:
         array = numbers(to_si(value, declared["unit"]))
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
-    if array.shape or declared["shape"]:
+    if array.shape or (declared["shape"] and not declared["one_for_all"]):
         return array
     number = float(array)
     return int(number) if declared["range"].whole and number.is_integer() else number

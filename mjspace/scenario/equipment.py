@@ -1,6 +1,6 @@
 """What is fitted to a vehicle: the base of the tables of actuators."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, Self
 
@@ -55,10 +55,20 @@ class Equipment:
         """
 
     def driven(self, model: Any) -> Driven:
-        """Return what of the compiled ``MjModel`` it drives.
+        """Return what of the compiled ``MjModel`` it drives by itself.
 
         Raises:
             ValueError: the model lacks it.
+        """
+        return Driven()
+
+    def driven_hinges(self, hinges: Sequence[str]) -> Driven:
+        """Return what it drives of the ``hinges`` with a motor that no equipment drives by itself.
+
+        They are named as their motors, in the order of ``ctrl``.
+
+        Raises:
+            ValueError: a hinge that it needs is not among them.
         """
         return Driven()
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from types import GenericAlias
 from typing import Annotated, Any
 
 import numpy as np
@@ -74,13 +75,16 @@ class Interval(Si):
 
 @dataclass(frozen=True)
 class OneOrEach:
-    """A positive number for all of a set, or a list with one for each."""
+    """A number for all of a set, or a list with one for each."""
+
+    kind: Any
+    """The type of each."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
         """Validate a single number as a list of one."""
-        each = handler.generate_schema(list[Positive])
+        each = handler.generate_schema(GenericAlias(list, (self.kind,)))
         return core_schema.no_info_wrap_validator_function(
             self._validated, each, serialization=core_schema.simple_ser_schema("any")
         )
@@ -141,8 +145,10 @@ KindName = Annotated[str, WrapValidator(_marked)]
 FileName = Annotated[str, AfterValidator(_file_name)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
-Each = Annotated[float | list[Positive], OneOrEach()]
+Each = Annotated[float | list[Positive], OneOrEach(Positive)]
 """Of each of a set: wheels, coils, ....  With its unit behind: ``Annotated[Each, Si("kg")]``."""
+EachNonNegative = Annotated[float | list[NonNegative], OneOrEach(NonNegative)]
+"""Likewise, of what may be zero."""
 Seconds = Annotated[Positive, Si("s")]
 Period = Annotated[Positive, Field(ge=1e-9), Si("s")]
 """From one instant to another: a log's clock has nanoseconds, in 64 bits."""

@@ -153,16 +153,16 @@ class PlantTable(Table):
     """Of the vehicle and others, by a name of one's own: ``[plant.connections.dock]``."""
 
     # The actuators, in the order in which they act and are logged. A line registers each.
+    wheels: Annotated[Any, _WHEELS] = Field(default_factory=lambda: _WHEELS.table())
+    """Its reaction wheels; three on the body axes when left out."""
     drives: Annotated[Any, DeclaredIn("mjspace.actuators.motor_drives:DriveTables")] = None
     """Electric motors that turn hinges of the parts, by the hinge: ``[plant.drives.cmg_outer]``. A
     hinge whose name ends in ``wheel`` is a wheel, any other a gimbal."""
     servos: Annotated[Any, DeclaredIn("mjspace.actuators.gimbal_servos:Servos")] = None
     """Speed loops on every hinge of the parts that a motor turns, in place of ``drives``; none when
-    left out."""
+    left out. Beside reaction wheels where these are given."""
     engine: Annotated[Any, DeclaredIn("mjspace.actuators.engine:Engine")] = None
     """Its engine on gimbals, of a model that has one; no wheels then."""
-    wheels: Annotated[Any, _WHEELS] = Field(default_factory=lambda: _WHEELS.table())
-    """Its reaction wheels; three on the body axes when left out."""
     ideal_thrusters: Annotated[Any, DeclaredIn("mjspace.actuators.ideal_thrusters:Switched")] = None
     """Whether the torque that the law commands acts on the bus as if by thrusters, unchanged: its
     command's ``torque`` or, beside motors or an engine, its ``thruster_torque``. Not when left

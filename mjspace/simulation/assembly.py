@@ -24,7 +24,7 @@ from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
-from mjspace.vehicle.vehicle import Vehicle, build, initial_state
+from mjspace.vehicle.vehicle import Vehicle, build, driven_by, initial_state
 
 if TYPE_CHECKING:
     from mjspace.environment.geomagnetism import FieldAlongOrbit
@@ -286,11 +286,11 @@ def _actuators(vehicle: Vehicle, scenario: Scenario, *, inner: bool) -> Actuator
     tables, gravity = scenario.plant.equipment, _gravity_at_start(scenario)
     kinds = model_motors.actuators_of(vehicle, alone=not any(t.fitted for t in tables.values()))
     alone = len(tables) == 1 and not kinds
+    driven = driven_by(vehicle.model, scenario.plant, vehicle.own.driven)
     for key, table in tables.items():
         with input_error_at(f"plant.{key}"):
-            driven = table.driven(vehicle.model)
             context = Context(
-                vehicle, driven, scenario.rates, scenario.initial, gravity, inner, kinds, alone
+                vehicle, driven[key], scenario.rates, scenario.initial, gravity, inner, kinds, alone
             )
             kinds += (table.actuator(context),)
     return ActuatorSet(kinds)

@@ -1,6 +1,6 @@
 """Where a vehicle's joints, motors and sensors are in MuJoCo's arrays."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 import mujoco
@@ -34,11 +34,15 @@ def bus_id(model: Any) -> int:
     return int(model.jnt_bodyid[0])
 
 
-def turned(model: Any) -> list[str]:
-    """Return the joints that motors turn, in the order of ``ctrl``, but for deployed booms'."""
+def turned(model: Any, others: Collection[str]) -> list[str]:
+    """Return the joints that motors turn, in the order of ``ctrl``, but for deployed booms'.
+
+    Those of the motors that are called as ``others`` are left out.
+    """
     plain = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE)
     on_joints = np.flatnonzero(plain & (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)))
-    return [model.joint(model.actuator_trnid[i, 0]).name for i in on_joints]
+    ours = (i for i in on_joints if model.actuator(i).name not in others)
+    return [model.joint(model.actuator_trnid[i, 0]).name for i in ours]
 
 
 def axes(model: Any, dofs: Any) -> Any:

@@ -7,7 +7,6 @@ velocity in BODY axes. The body origin is the vehicle's centre of mass, but for 
 
 import gzip
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -101,22 +100,25 @@ def build(
     if source is not None:
         model, gyrostat = own_model.compiled(spec), None
     elif table.vehicle_mass is not None:
-        gyrostat = np.array(table.vehicle_inertia)
+        whole = np.array(table.vehicle_inertia)
+        gyrostat = whole - rotors.axes.T @ (rotors.inertia[:, None] * rotors.axes)
         bodies = inertials(spec.compile())
         others = [each for name, each in bodies.items() if name != composition.bus_of(spec).name]
-        inertial = mass_properties.remainder(table.vehicle_mass, gyrostat, others)
+        inertial = mass_properties.remainder(table.vehicle_mass, whole, others)
         model = _compile(spec, inertial)
     else:
         stated = mass_properties.own_inertia(composition.bus_of(spec))
         inertial, gyrostat = mass_properties.bus(table, rotors, stated)
         model = _compile(spec, inertial)
     model_checks.check(model)
-    driven = Driven.together([own.driven, *_driven(model, table)])
+    driven = Driven.together([own.driven, *driven_by(model, table, own.driven).values()])
     where = indices.of(model, driven)
     axes, inertia = rotors.axes, rotors.inertia
     if gyrostat is None:
-        axes = indices.axes(model, where["wheel_dof"])
-        inertia = indices.axial_inertia(model, where["wheel_dof"])
+        # Wheels in gimbals, whose axes turn, come after reaction wheels.
+        on_bus_dof = where["wheel_dof"][: len(own.wheels) + len(rotors.axes)]
+        axes = indices.axes(model, on_bus_dof)
+        inertia = indices.axial_inertia(model, on_bus_dof)
         _, _, gyrostat = mass_properties.together(inertials(model).values())
         gyrostat -= axes.T @ (inertia[:, None] * axes)
 
@@ -232,10 +234,23 @@ def from_mjb(mjb: bytes) -> Any:
     return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": mjb})
 
 
-def _driven(model: Any, table: PlantTable) -> Iterator[Driven]:
+def driven_by(model: Any, table: PlantTable, own: Driven) -> dict[str, Driven]:
+    """Return what each piece of equipment of the compiled ``model`` drives, by its key.
+
+    ``own`` is what a user's own model drives.
+
+    Raises:
+        ValueError: the model lacks something of it, with the key.
+    """
+    found = {}
     for key, fitted in table.equipment.items():
         with input_error_at(f"plant.{key}"):
-            yield fitted.driven(model)
+            found[key] = fitted.driven(model)
+    left = indices.turned(model, Driven.together([own, *found.values()]).motors)
+    for key, fitted in table.equipment.items():
+        with input_error_at(f"plant.{key}"):
+            found[key] = Driven.together([found[key], fitted.driven_hinges(left)])
+    return found
 
 
 def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:

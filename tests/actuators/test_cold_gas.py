@@ -83,15 +83,58 @@ def test_valves_share_one_tank_and_a_batch_is_its_vehicles() -> None:
     np.testing.assert_allclose(together["cold_gas"], one_by_one["cold_gas"], rtol=1e-14)
 
 
+def test_a_burn_goes_on_to_its_end_and_can_be_shut() -> None:
+    flown = thrusters(2, burns="to_the_end", minimum_on=0.0075)
+    shut = [[0.0, -1.0], [0.0, 0.0], [0.0, 0.002]]
+    state, impulse, cut = fire(flown, [[0.1234, 0.05], [0.03, 0.05], *shut, *[[0.0, 0.0]] * 5])
+    # Without regulator, but of so little gas that it hardly matters: 0.6 % in a step.
+    edges = STEP * np.arange(41)
+    expected = [
+        np.diff(np.clip(edges, 0.0, 0.1234)),
+        np.diff(np.clip(edges, 0.0, 0.04) + np.clip(edges, 0.08, 0.0875)),
+    ]
+    np.testing.assert_allclose(impulse.T / FORCE, expected, rtol=0.1, atol=1e-15)
+    # The closed form of the isothermal tank, by the time for which valves were open.
+    open_for = 0.1234 + 0.04 + 0.0075
+    left = np.exp(-open_for * FORCE / (GAS * SPEED))
+    assert state["cold_gas"][0, 0] / GAS == pytest.approx(left, rel=1e-13)
+    assert impulse.sum() == pytest.approx(SPEED * GAS * (1.0 - left), rel=1e-11)
+    assert cut[:, 1].tolist() == [0.0] * 16 + [1.0] * 4 + [0.0] * 20
+    assert not cut[:, 0].any()
+    check_batch(thrusters(3, burns="to_the_end"))
+
+
+def test_unlike_valves_follow_the_equations_of_flow_and_thrust() -> None:
+    exponent, on = 1.4, 3.0
+    thrust, impulse = np.array([2.0, 0.5, 1.0]), np.array([70.0, 55.0, 60.0])
+    table = ColdGas(
+        **layout(3, thrust.tolist()), specific_impulse=impulse.tolist(), gas=GAS, exponent=exponent
+    )
+    flown = built(table, "cold_gas_tank", mass=GAS, inertia=2e-4)
+    flow = np.sum(thrust / (impulse * STANDARD_GRAVITY)) / GAS
+
+    def rates(time: float, y: Array) -> Array:
+        return np.array([-flow * y[0] ** (0.5 * (exponent + 1.0)), y[0] ** exponent])
+
+    solved = solve_ivp(rates, (0.0, on), [1.0, 0.0], rtol=1e-11, atol=1e-13)
+    state, given, _ = fire(flown, [[PERIOD] * 3] * round(on / PERIOD))
+    assert state["cold_gas"][0, 0] / GAS == pytest.approx(solved.y[0, -1], rel=1e-9)
+    np.testing.assert_allclose(given.sum(axis=0), thrust * solved.y[1, -1], rtol=1e-9)
+    # What a stuck valve spends leaves by its own nozzle.
+    after, _ = flown.account(flown.reset(1), np.zeros((1, 3)), np.eye(3)[1:2], STEP)
+    spent = STEP / (impulse[1] * STANDARD_GRAVITY)
+    assert GAS - after["cold_gas"][0, 0] == pytest.approx(spent, rel=1e-9)
+
+
 def test_what_a_stuck_valve_spends_leaves_the_tank_at_its_exhaust_speed() -> None:
     flown, applied, stuck = thrusters(2, exponent=1.4), np.zeros((1, 2)), np.array([[0.0, 0.5]])
     half = flown.reset(1) | {"cold_gas": np.full((1, 1), 0.5 * GAS)}
-    after, thrust = flown.account_propellant(half, applied, stuck, STEP)
+    after, thrust = flown.account(half, applied, stuck, STEP)
     np.testing.assert_array_equal(thrust, stuck)
     speed = SPEED * 0.5**0.2  # it falls with the root of the temperature, (1/2)^(n - 1)
     assert 0.5 * GAS - after["cold_gas"][0, 0] == pytest.approx(0.5 * STEP / speed, rel=1e-9)
     empty = {"cold_gas": np.zeros((1, 1)), "cold_gas_step": np.zeros((1, 1))}
-    after, thrust = flown.account_propellant(empty, applied, stuck, STEP)
+    after, thrust = flown.account(empty, applied, stuck, STEP)
     assert not thrust.any()
 
 

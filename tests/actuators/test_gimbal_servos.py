@@ -1,6 +1,7 @@
 """Speed loops on gimbals and wheels: their limits, and the pyramid of CMGs that they turn."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ NONE = np.zeros((1, 0))
 def servos(**table: Any) -> GimbalServos:
     """Return the loops of two CMGs whose motors are gimbal, wheel, gimbal, wheel."""
     driven = gimbals_and_wheels(["a", "a_wheel", "b", "b_wheel"])
-    vehicle: Any = None  # nothing of it but the hinges matters
+    vehicle: Any = SimpleNamespace(driven=driven)  # nothing of it but the hinges matters
     context = Context(vehicle, driven, Rates(), Initial())
     return Servos(**{"wheel_speed": 500.0} | table).actuator(context)
 
@@ -153,8 +154,12 @@ def test_a_log_is_flown_again_bit_for_bit(tmp_path: Path) -> None:
 
 
 def test_what_cannot_fly_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"servos and wheels are both given: set wheels\.axes"):
-        load("cmg-slew", ["plant.wheels.axes=[[1,0,0]]"])
+    with pytest.raises(
+        InputError, match=r"plant\.servos: wheel_speed: missing, and cmg_0_wheel is"
+    ):
+        assemble(*load("antenna-slew", ["plant.parts.cmg_0={part='cmg'}"]))
+    with pytest.raises(InputError, match=r"plant\.servos: no hinge of the parts has a motor that"):
+        assemble(*load("antenna-slew", ["plant.parts={}"]))
     drive = "{pole_pairs=1, resistance=1, inductance=1, torque_constant=1}"
     with pytest.raises(InputError, match="drives and servos are both given: give one"):
         load("cmg-slew", [f"plant.drives.cmg_0_wheel={drive}"])

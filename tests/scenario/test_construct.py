@@ -82,6 +82,24 @@ def test_what_is_wrong_is_said(kind: str, gains: dict[str, object], message: str
         build(kind, **gains)
 
 
+def test_a_gain_of_each_may_be_one_for_all_where_that_is_declared() -> None:
+    rows = {"thruster_positions": np.eye(3), "thruster_directions": np.eye(3)}
+    facts = FACTS | rows | {"thruster_force": np.ones(3), "control_period": 0.1}
+    gains: dict[str, Any] = {"attitude_gain": 1.0, "rate_gain": 1.0}
+
+    def shortest(value: Any) -> Any:
+        component = Component(kind="pulsed_pd:PulsedPd", **gains | {"thruster_minimum_on": value})
+        kind = Trust(Path()).load_class(component.kind)
+        return construct(component, kind, facts, Trust(Path()))[0].thruster_minimum_on
+
+    assert shortest("20 ms") == 0.02
+    np.testing.assert_array_equal(shortest(["20 ms", 0.0, 0.01]), [0.02, 0.0, 0.01])
+    with pytest.raises(ValueError, match="thruster_minimum_on: 2 rows for 3 of thruster_positions"):
+        shortest([0.02, 0.01])
+    with pytest.raises(ValueError, match=r"thruster_minimum_on: got -1 s, should be 0 or more"):
+        shortest(-1.0)
+
+
 UNDECLARED = """
 from dataclasses import dataclass, field
 from typing import Any, Literal

@@ -32,6 +32,8 @@ def test_actuators_act_and_are_logged_in_this_order() -> None:
     everything = [name for name, value in PlantTable().model_dump().items() if value is None]
     order = ["drives", "servos", "engine", "ideal_thrusters", "rcs", "cold_gas", "magnetorquers"]
     assert [name for name in everything if name in order] == order
+    # Wheels in gimbals come after reaction wheels: whoever knows of these alone has the first.
+    assert fitted(servos={"wheel_speed": 1.0}) == ["wheels", "servos"]
     found = fitted(magnetorquers={}, rcs=THRUSTER, ideal_thrusters=True)
     assert found == ["wheels", "ideal_thrusters", "rcs", "magnetorquers"]
 
@@ -56,7 +58,6 @@ def test_a_vehicle_with_nothing_else_has_wheels_of_which_there_may_be_none() -> 
     [
         ({"drives": {"a": MOTOR}}, "drives and wheels are both given: set wheels.axes = "),
         ({"engine": {"thrust_max": 1.0}}, "engine and wheels are both given: set wheels.axes = "),
-        ({"servos": {"wheel_speed": 1.0}}, "servos and wheels are both given: set wheels.axes = "),
         (
             {"wheels": {"axes": []}, "drives": {"a": MOTOR}, "engine": {"thrust_max": 1.0}},
             "drives and engine are both given: give one",

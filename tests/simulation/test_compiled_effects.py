@@ -26,6 +26,14 @@ CRASHES = ["duration=0.6", "initial.position=[0.0, 0.0, 2.6]", "initial.velocity
 PLACES = "[[0,0.4,0],[0,-0.4,0],[0,0.4,0],[0,-0.4,0],[0,0,0.5],[0,0,-0.5],[0,0,0.5],[0,0,-0.5]]"
 WAYS = "[[0,0,1],[0,0,-1],[0,0,-1],[0,0,1],[0,1,0],[0,-1,0],[0,-1,0],[0,1,0]]"
 COLD_GAS = "thrust=0.5,specific_impulse='70 s',gas=0.5,exponent=1.4,minimum_on=0.01"
+UNLIKE = [
+    *(
+        "plant.rcs.thrust=[0.5,0.8,0.5,0.5,0.9,0.5,0.5,0.7,0.5,0.6,0.5,0.5]",
+        "plant.rcs.rise='7 ms'",
+    ),
+    "plant.rcs.delay=[0.005,0.015,0.005,0.005,0.12,0.005,0.005,0,0.005,0.005,0.005,0.005]",
+    "plant.rcs.specific_impulse=[220,200,220,220,220,220,220,220,220,220,220,180]",
+]
 SCENARIOS = {
     "lander-touchdown": ("lander", LANDS, "the ground contact, the burning mass", 1),
     "lander-crash": ("lander", CRASHES, "the ground contact, the burning mass", 3),
@@ -34,6 +42,22 @@ SCENARIOS = {
     "rcs-three-axis, empty": (
         "rcs-three-axis",
         ["duration=6", "plant.rcs.propellant='0.1 g'"],
+        "the burning mass",
+        0,
+    ),
+    "unlike thrusters, burns over several periods": (
+        "rcs-three-axis",
+        [*("duration=4", "plant.rcs.burns='to_the_end'", "law.control_period='300 ms'"), *UNLIKE],
+        "the burning mass",
+        0,
+    ),
+    "cold gas, burns over several periods": (
+        "detumble-wheels",
+        [
+            *("duration=2", "rates.control=0.1", "plant.wheels.axes=[]", "initial.wheel_speed=[]"),
+            "law={kind='pulsed_pd:PulsedPd',attitude_gain=0,rate_gain=8,control_period=0.3}",
+            f"plant.cold_gas={{positions={PLACES},directions={WAYS},{COLD_GAS},burns='to_the_end'}}",
+        ],
         "the burning mass",
         0,
     ),
@@ -56,6 +80,16 @@ SCENARIOS = {
         ],
         "the faults",
         3,
+    ),
+    "dead, and its power": (
+        "wheel-failure",
+        [
+            "duration=2",
+            "plant.wheels.efficiency=0.7",
+            "faults=[{motor='wheel_1',kind='dead',at=0.51,until=1.3}]",
+        ],
+        "the faults",
+        2,
     ),
     "stuck by a signal": (
         "wheel-stuck",
@@ -118,7 +152,14 @@ def test_effects_act_in_each_vehicle_by_itself_at_any_number_of_threads() -> Non
         assert alone.bits(0) == python.bits(vehicle)
 
 
-@pytest.mark.parametrize("case", ["lander-touchdown", "dead from a time on", "yo-yo", "boom"])
+@pytest.mark.parametrize(
+    "case",
+    [
+        *("lander-touchdown", "dead from a time on", "yo-yo", "boom", "dead, and its power"),
+        "unlike thrusters, burns over several periods",
+        "cold gas, burns over several periods",
+    ],
+)
 def test_any_logged_period_is_a_start(case: str) -> None:
     name, overrides, effects, _ = SCENARIOS[case]
     built = assembly(name, *overrides)

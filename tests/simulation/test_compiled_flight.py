@@ -46,6 +46,11 @@ SCENARIOS = {
         *("sensors.attitude.noise_std=1e-3", "sensors.attitude.delay='3 ms'"),
         *("sensors.rate.bias_std=0.01", "sensors.rate.bias_walk=0.01"),
     ],
+    "antenna-slew": [  # servos beside wheels, whose power is limited
+        *("duration=3", "law.start_time=0", "plant.wheels.efficiency=0.8"),
+        *("plant.wheels.power_limit='4 mW'", "plant.wheels.total_power_limit='10 mW'"),
+        *("plant.wheels.regenerates=true", "plant.wheels.momentum_margin=true"),
+    ],
     "dgvscmg-sensorless": ["duration=0.05"],  # an inner loop that measures with a bias
 }
 
@@ -57,7 +62,7 @@ def test_compiled_rows_and_events_are_pythons(name: str) -> None:
     assert compiled.compiled == WHOLE
     assert not compiled.trouble
     assert_same(compiled, python)
-    if name == "contraction-adaptive":
+    if name in ("contraction-adaptive", "antenna-slew"):
         assert any("saturated" in event.message for event in compiled.events)
 
 

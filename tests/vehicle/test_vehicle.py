@@ -326,7 +326,7 @@ def test_a_part_with_a_constraint_has_it_enforced() -> None:
 
 def test_an_unknown_part_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(
-        ValueError, match=r"plant\.parts\.it\.part: no part 'solar_sail': have boom"
+        ValueError, match=r"plant\.parts\.it\.part: no part 'solar_sail': have antenna, boom"
     ):
         build(parts={"it": Part(part="solar_sail")})
 

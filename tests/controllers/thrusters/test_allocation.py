@@ -66,6 +66,13 @@ def test_pulses_carry_over_what_they_do_not_fire() -> None:
     np.testing.assert_allclose(1000 * period * shares - fired, carry, atol=1e-10)
 
 
+def test_each_of_unlike_thrusters_has_its_own_least_pulse() -> None:
+    due, least = np.array([0.2, 0.2, 0.4]), np.array([0.01, 0.03, 0.03])
+    on_time, carry = pulses(due, np.zeros(3), 0.1, least)
+    np.testing.assert_allclose(on_time, [0.02, 0.0, 0.04], atol=1e-15)
+    np.testing.assert_allclose(carry, [0.0, 0.02, 0.0], atol=1e-15)
+
+
 def test_a_pattern_is_a_pure_torque_at_full_thrust() -> None:
     shares = pattern(-Y, EFFECTS)
     np.testing.assert_allclose(shares, np.eye(12)[6] + np.eye(12)[7], atol=1e-12)
