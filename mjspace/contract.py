@@ -262,7 +262,8 @@ class Law(Protocol):
     vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any command with
     that field; motors with an electrical side a ``VoltageCommand``; gimbals with speed loops a
     ``GimbalRateCommand``; an engine on gimbals a ``ThrustCommand``, on/off thrusters a
-    ``PulseCommand``. ``reference`` is a row of the scenario's reference: ``DesiredMotion``.
+    ``PulseCommand``, arms any command with a field ``joint_torque``. ``reference`` is a row of the
+    scenario's reference: ``DesiredMotion``.
 
     Laws are flown compiled where that is possible: ``step`` is called once on arrays that note what
     is computed with them, and for the first of at most 2000 periods. One that has to be called in
