@@ -52,8 +52,7 @@ class Measurement:
     wheel_speed: Annotated[Array, Unit("rad/s", display="rpm")] = _NONE
     """Wheel speeds relative to what carries them [rad/s], shape (..., n)."""
     gimbal_angle: Annotated[Array, Unit("rad")] = _NONE
-    """Gimbal angles, the outer before the inner, and those of arms' joints, the shoulder first
-    [rad], shape (..., g)."""
+    """Angles of gimbals, the outer before the inner, and of arms' joints [rad], shape (..., g)."""
     gimbal_rate: Annotated[Array, Unit("rad/s")] = _NONE
     """Gimbal rates relative to what carries them [rad/s], shape (..., g)."""
     current: Annotated[Array, Unit("A")] = _NONE
@@ -338,9 +337,9 @@ def gain(
     The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
     constructed in Python. A gain without a default that is named like one of the plant's properties
     (``inertia``, ``wheel_axes``, ``wheel_inertia``; with gimbals that have speed loops
-    ``gimbal_axes`` and ``spin_axes``; with arms ``link_length``, ``link_mass`` and
-    ``link_inertia``), or ``control_period`` or ``inner_period``, may be left out
-    of the table: it is then taken from the vehicle as flown.
+    ``gimbal_axes`` and ``spin_axes``; with arms ``link_length``, ``link_mass``, ``link_inertia``),
+    or ``control_period`` or ``inner_period``, may be left out of the table: it is then taken from
+    the vehicle as flown.
     """
     limits = Range(above, at_least, below, at_most, whole)
     metadata = {"unit": unit, "shape": shape, "range": limits, "form": form}
