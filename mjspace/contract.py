@@ -52,8 +52,7 @@ class Measurement:
     wheel_speed: Annotated[Array, Unit("rad/s", display="rpm")] = _NONE
     """Wheel speeds relative to what carries them [rad/s], shape (..., n)."""
     gimbal_angle: Annotated[Array, Unit("rad")] = _NONE
-    """Gimbal angles, the outer before the inner, and those of arms' joints, the shoulder first
-    [rad], shape (..., g)."""
+    """Angles of gimbals, the outer before the inner, and of arms' joints [rad], shape (..., g)."""
     gimbal_rate: Annotated[Array, Unit("rad/s")] = _NONE
     """Gimbal rates relative to what carries them [rad/s], shape (..., g)."""
     current: Annotated[Array, Unit("A")] = _NONE
@@ -262,7 +261,8 @@ class Law(Protocol):
     vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any command with
     that field; motors with an electrical side a ``VoltageCommand``; gimbals with speed loops a
     ``GimbalRateCommand``; an engine on gimbals a ``ThrustCommand``, on/off thrusters a
-    ``PulseCommand``. ``reference`` is a row of the scenario's reference: ``DesiredMotion``.
+    ``PulseCommand``, arms any command with a field ``joint_torque``. ``reference`` is a row of the
+    scenario's reference: ``DesiredMotion``.
 
     Laws are flown compiled where that is possible: ``step`` is called once on arrays that note what
     is computed with them, and for the first of at most 2000 periods. One that has to be called in
@@ -339,8 +339,8 @@ def gain(
     constructed in Python. A gain without a default that is named like one of the plant's properties
     (``inertia``, ``wheel_axes``, ``wheel_inertia``; with gimbals that have speed loops
     ``gimbal_axes``, ``gimbal_inertia``, ``spin_axes`` and ``spin_inertia``; with arms
-    ``link_length``, ``link_mass`` and ``link_inertia``), or ``control_period`` or
-    ``inner_period``, may be left out of the table: it is then taken from the vehicle as flown.
+    ``link_length``, ``link_mass``, ``link_inertia``), or ``control_period`` or ``inner_period``,
+    may be left out of the table: it is then taken from the vehicle as flown.
     """
     limits = Range(above, at_least, below, at_most, whole)
     metadata: dict[str, Any] = {"unit": unit, "shape": shape, "range": limits, "form": form}
