@@ -247,8 +247,8 @@ class PulseCommand(NamedTuple):
     """A law's command to on/off thrusters."""
 
     on_time: Annotated[Array, Unit("s")]
-    """For how long each is on, from the beginning of the control period [s], shape (..., n); of the
-    integration step, where an inner loop commands it. A negative one shuts a valve."""
+    """For how long each is on, from the beginning of the control period or, of an inner loop, the
+    integration step [s], shape (..., n). A negative one shuts a valve."""
 
 
 class Law(Protocol):
@@ -337,10 +337,9 @@ def gain(
 
     The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
     constructed in Python. A gain without a default that is named like one of the plant's properties
-    (``inertia``, ``wheel_axes``, ``wheel_inertia``; with gimbals that have speed loops
-    ``gimbal_axes``, ``gimbal_inertia``, ``spin_axes`` and ``spin_inertia``; with arms
-    ``link_length``, ``link_mass``, ``link_inertia``), or ``control_period`` or ``inner_period``,
-    may be left out of the table: it is then taken from the vehicle as flown.
+    (``inertia``, ``wheel_axes``, ``wheel_inertia``; with servos ``gimbal_axes``, ``gimbal_inertia``,
+    ``spin_axes``, ``spin_inertia``; with arms ``link_length``, ``link_mass``, ``link_inertia``), or
+    ``control_period`` or ``inner_period``, may be left out: it is then taken from the vehicle.
     """
     limits = Range(above, at_least, below, at_most, whole)
     metadata: dict[str, Any] = {"unit": unit, "shape": shape, "range": limits, "form": form}

@@ -89,6 +89,13 @@ class OneOrEach:
             self._validated, each, serialization=core_schema.simple_ser_schema("any")
         )
 
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Return that it is a number or a list of such numbers."""
+        listed = handler(schema)
+        return {"anyOf": [listed["items"], listed]}
+
     def _validated(self, value: Any, inner: core_schema.ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, list):
             return inner(value)
