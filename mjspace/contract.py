@@ -336,10 +336,9 @@ def gain(
     "increasing" values. ``one_for_all`` admits a single number in place of the array.
 
     The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
-    constructed in Python. A gain without a default that is named like one of the plant's properties
-    (``inertia``, ``wheel_axes``, ``wheel_inertia``; with servos ``gimbal_axes``, ``gimbal_inertia``,
-    ``spin_axes``, ``spin_inertia``; with arms ``link_length``, ``link_mass``, ``link_inertia``), or
-    ``control_period`` or ``inner_period``, may be left out: it is then taken from the vehicle.
+    constructed in Python. A gain without a default that is named as a fact of the plant is
+    (``inertia``, ``wheel_axes``, ``wheel_inertia``, ``control_period``, ``inner_period``, and those
+    of servos and arms, as ``mjspace law-header`` lists them) may be left out: it is then that fact.
     """
     limits = Range(above, at_least, below, at_most, whole)
     metadata: dict[str, Any] = {"unit": unit, "shape": shape, "range": limits, "form": form}
