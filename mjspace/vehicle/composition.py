@@ -78,6 +78,8 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
                 armature=not table.without_armature,
             )
         _add_surroundings(spec, bare)
+    several = bool(table.spacecraft or other_spacecraft.names_of(spec))
+    _add_sensors(spec, whole="world" if several else bus_of(spec).name)
     of_model = _joint_names(spec)
     _attach_equipment(spec, table, before_parts=True)
     of_equipment = _joint_names(spec) - of_model
@@ -100,7 +102,6 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
         other_spacecraft.add_ports(spec, table.ports, bus_of(spec))
     others = other_spacecraft.names_of(spec)
     relative = relative_motion.add_sensors(spec, bus_of(spec).name, others, table.connections)
-    _add_sensors(spec, whole="world" if others else bus_of(spec).name)
     stops = any(hinge.stops for hinge in table.hinges.values())
     if stops:
         # The torques on a gimbal and on what carries it differ by the solver's remainder: at its
