@@ -2,6 +2,7 @@
 
 The command line's words from Python: ``list_scenarios()``, ``load(scenario)``, ``run(scenario)``,
 ``replay(log, out)``, ``verify(log)``, ``plot(log, file)``, ``figure(log)``, ``render(log, file)``.
+``convert(log, file)`` writes a log for other tools, ``compare(log, other)`` says how two differ.
 ``linearize(scenario)`` gives the matrices of its vehicle.
 ``Log(path)`` reads a log as NumPy arrays. Where a log is an argument, its path or a ``Log`` may be.
 """
@@ -21,6 +22,8 @@ __version__ = "0.1.0"
 # None of these names is one of a module or a package of mjspace: importing that would replace it.
 _MODULES = {
     "Log": "mjspace.log.reader",
+    "compare": "mjspace.log.compare",
+    "convert": "mjspace.log.convert",
     "figure": "mjspace.plotting.page",
     "linearize": "mjspace.simulation.linearization",
     "list_scenarios": "mjspace.scenario.files",
@@ -34,6 +37,8 @@ _MODULES = {
 
 __all__ = [
     "Log",
+    "compare",
+    "convert",
     "figure",
     "linearize",
     "list_scenarios",

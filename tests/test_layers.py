@@ -40,7 +40,7 @@ ROOMS = {
     "environment": "contract errors scenario vehicle",
     "sensors": "attitude contract errors gufunc scenario units",
     "actuators": ("contract environment errors gufunc scenario sensors signals units vehicle"),
-    "log": "attitude contract errors scenario units",
+    "log": "attitude contract errors scenario signals units",
     "plotting": "contract errors log scenario signals units",
     "rendering": "attitude contract environment errors log scenario vehicle",
     "simulation": (

@@ -1,9 +1,10 @@
 """The command line: ``list``, ``info``, ``run``, ``replay``, ``render``, ``plot``, ``validate``.
 
-``law-header``, ``serve-law`` and ``linearize`` are for flight software; ``recover`` saves what is
-whole of a damaged log. Exit status: 0 every check came out as the scenario expects, 1 flown but one
-did not (or a replay differed, or the flight ended early), 2 bad input. Modules are imported when a
-command needs them: ``--help`` answers at once.
+``convert`` and ``compare`` are for logs,
+``law-header``, ``serve-law`` and ``linearize`` for flight software; ``recover`` saves what is whole
+of a damaged log. Exit status: 0 every check came out as the scenario expects, 1 flown but one did
+not (or a replay or a comparison differed, or the flight ended early), 2 bad input. Modules are
+imported when a command needs them: ``--help`` answers at once.
 """
 
 import sys
@@ -12,6 +13,7 @@ import warnings
 import typer
 
 from mjspace.cli import (
+    data,
     flight_software,
     flights,
     models,
@@ -39,6 +41,8 @@ app.command()(flights.run)
 app.command()(flights.replay)
 app.command()(pictures.render)
 app.command()(pictures.plot)
+app.command()(data.convert)
+app.command()(data.compare)
 app.command()(flight_software.law_header)
 app.command()(flight_software.serve_law)
 app.command()(flight_software.linearize)
