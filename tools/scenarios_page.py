@@ -7,9 +7,8 @@ import warnings
 from importlib import import_module
 from pathlib import Path
 
-from mjspace.scenario.files import scenario_names
+from mjspace.scenario.files import scenario_names, subjects
 from mjspace.scenario.loading import load
-from mjspace.scenario.trust import controllers
 
 PAGE = Path(__file__).parents[1] / "docs/scenarios.md"
 HEAD = """# What flies
@@ -32,14 +31,14 @@ the command line. Laws and references are listed [with their gains][laws].
 
 def page() -> str:
     """Return the page."""
-    folder = {module: full.split(".")[2] for module, full in controllers().items()}
+    subject_of = subjects()
     groups: dict[str, list[str]] = {}
     for name in scenario_names():
         with warnings.catch_warnings(action="ignore"):
             scenario, _ = load(name)
         law = scenario.law.kind
         row = f"| [`{name}`](../mjspace/scenarios/{name}.toml) | {scenario.description} | `{law}` |"
-        groups.setdefault(folder[law.partition(":")[0]], []).append(row)
+        groups.setdefault(subject_of[name], []).append(row)
     lines = [HEAD]
     for group, rows in sorted(groups.items()):
         subject = (import_module(f"mjspace.controllers.{group}").__doc__ or "").partition("\n")[0]

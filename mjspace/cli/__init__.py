@@ -9,9 +9,11 @@ imported when a command needs them: ``--help`` answers at once.
 
 import sys
 import warnings
+from typing import Annotated
 
 import typer
 
+from mjspace import __version__
 from mjspace.cli import (
     data,
     flight_software,
@@ -27,12 +29,24 @@ from mjspace.rendering import graphics
 from mjspace.terminal.reporting import report_errors
 
 app = typer.Typer(
-    help="Fly control laws on multibody spacecraft in MuJoCo.",
+    invoke_without_command=True,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help, in half the time
 )
+
+
+@app.callback()
+def _every_command(
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
+) -> None:
+    """Fly control laws on multibody spacecraft in MuJoCo."""
+    if version:
+        print(f"mjspace {__version__}")
+        raise typer.Exit
+
+
 app.command("list")(scenarios.list_scenarios)
 app.command()(scenarios.info)
 app.command()(models.inspect)

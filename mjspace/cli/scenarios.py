@@ -1,6 +1,8 @@
 """The commands ``mjspace list`` and ``mjspace info``."""
 
 import json
+import shutil
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -11,17 +13,40 @@ from mjspace.terminal.options import Json, Set, Trust
 from mjspace.terminal.reporting import open_log
 
 
-def list_scenarios(as_json: Json = False) -> None:
-    """List the scenarios that come with mjspace."""
+def list_scenarios(
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[WORD]...", help="Those alone that say all of these words."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the scenarios that come with mjspace, by the subject of their law."""
     from mjspace.scenario import files
 
-    found = files.list_scenarios()
+    sought = [word.lower() for word in words or ()]
+    found = {
+        name: description
+        for name, description in files.list_scenarios().items()
+        if all(word in f"{name} {description}".lower() for word in sought)
+    }
+    if not found:
+        raise InputError(f"list: no scenario says {' '.join(map(repr, words or ()))}")
     if as_json:
         print(json.dumps(found, indent=2))
         return
+    subjects = files.subjects()
     width = max(map(len, found))
-    for name, description in found.items():
-        print(f"{name:{width}}  {description}")
+    for subject in dict.fromkeys(sorted(subjects[name] for name in found)):
+        print(f"{subject}:")
+        for name, description in found.items():
+            if subjects[name] == subject:
+                print(_fitting(f"  {name:{width}}  {description}"))
+
+
+def _fitting(line: str) -> str:
+    """Return the line, on a terminal cut to its width."""
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else len(line)
+    return line if len(line) <= columns else line[: columns - 3].rstrip() + "..."
 
 
 def info(

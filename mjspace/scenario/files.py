@@ -7,6 +7,7 @@ from typing import Any
 
 from mjspace.errors import InputError
 from mjspace.scenario import raw
+from mjspace.scenario.trust import controllers
 
 _HALLMARKS = {"base", "description", "duration", "reference", "law"}
 """Keys of which a scenario has the first or all others."""
@@ -23,6 +24,13 @@ def scenario_names() -> list[str]:
 def list_scenarios() -> dict[str, str]:
     """Return the description of each scenario that comes with mjspace, by name, unvalidated."""
     return {name: read(path)["description"] for name, path in _shipped().items()}
+
+
+def subjects() -> dict[str, str]:
+    """Return the subject of each shipped scenario's law, the folder in controllers/, by name."""
+    folders = {name: full.split(".")[2] for name, full in controllers().items()}
+    laws = {name: read(path)["law"]["kind"] for name, path in _shipped().items()}
+    return {name: folders[law.partition(":")[0]] for name, law in laws.items()}
 
 
 def find(scenario: str) -> Path:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from mjspace import __version__
 from mjspace.cli import main
 from mjspace.log.reader import Log
 
@@ -43,6 +44,17 @@ def test_help_and_list() -> None:
     for name, description in listed.items():
         assert f"{name} " in lines
         assert description
+    assert lines.startswith("arms:\n  arm-reaction ")
+    assert "\nlanding:\n  lander " in lines
+    some = json.loads(mjspace("list", "Lander", "crater", "--json").stdout)
+    assert list(some) == ["lander-craters"]
+    none = mjspace("list", "warp")
+    assert (none.returncode, none.stderr) == (2, "mjspace: list: no scenario says 'warp'\n")
+
+
+def test_version() -> None:
+    done = mjspace("--version")
+    assert (done.returncode, done.stdout) == (0, f"mjspace {__version__}\n")
 
 
 def test_a_run_that_keeps_its_checks_ends_with_0(
