@@ -16,7 +16,7 @@ SIX = THETA[:6]
 def flown(period: float = 1e-3) -> Flight:
     gains = {"target_gain": 5.0, "manifold_gain": 5.0, "adaptation_gain": 1000.0}
     law = Adaptive(AXES, JW, control_period=period, **gains)
-    return flight(law, MultiAxis(), 8.0, period=period, w0=np.array([0.2, -0.142, 0.0]))
+    return flight(law, MultiAxis(), 5.0, period=period, w0=np.array([0.2, -0.142, 0.0]))
 
 
 def test_what_is_left_of_z_is_the_filtered_regressor_times_the_error() -> None:
@@ -35,7 +35,7 @@ def test_error_of_the_estimate_never_grows() -> None:
     of = flown()
     error = np.linalg.norm(of.states["theta_hat"] - SIX, axis=1)
     assert np.diff(error).max() < 1e-6 * error[0]
-    assert error[-1] < 0.45 * error[0]  # 12.2 of 28.7
+    assert error[-1] < 0.55 * error[0]  # 15 of 28.7
 
 
 class Known(Adaptive):
