@@ -39,6 +39,7 @@ OF_002 = {
     "contraction, gradient alone": 'kind="contraction:Gradient"',
     "passivity-based": 'kind="adaptive_tracking:Passivity"',
     "Hamiltonian": 'kind="adaptive_tracking:Hamiltonian"',
+    "passivity-based, rate observed": 'kind="adaptive_output_feedback:OutputFeedback"',
     "immersion and invariance, adaptive": 'kind="immersion_invariance_adaptive:Adaptive",'
     "target_gain=25,manifold_gain=1.67,adaptation_gain=1000",
 }
@@ -128,6 +129,11 @@ A motion about several axes, ours, for 40 s:
   manoeuvres it tracks as well. On a sweep of 120 deg about y, through a pitch of 90 deg, its flight
   ends so: {over_y}. The passivity-based law has an error of {passive_y:.1e} rad
   at most there.
+- **Without a gyro**, what 002 leaves for later, the passivity-based law tracks as well as with one
+  (`adaptive-output-feedback`). The rate is linear in 24 constants of inertia and momentum, and the
+  proof covers its convergence under any bounded motion; that of the whole is not proved, and the
+  flight with `law.momentum_scale=1` is unstable. With a known inertia the contraction law follows
+  its observer in cascade (`contraction-output-feedback`).
 - **Parameters.** 002 says that its estimates converge whatever the trajectory. On its own
   manoeuvres they do not, in any of these laws: a turn about one axis excites five of nine
   parameters. The signal `law.excitation`, the least eigenvalue of Z in (4.10), is {weak:.1e} at the

@@ -40,8 +40,8 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _GradientGains(Gains):
-    """What both laws share."""
+class GradientGains(Gains):
+    """Gains and adaptation of laws with the gradient of the tracking error."""
 
     control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
@@ -52,23 +52,23 @@ class _GradientGains(Gains):
     adaptation_gain: float = gain(default=1.0, above=0.0)
     """ga."""
 
+    def adapted(
+        self, theta_hat: Array, q: Array, s: Array, w_r: Array, dw_r: Array
+    ) -> tuple[Array, Array]:
+        """Return the next estimates, (..., 9), and Y theta_hat [N m], (..., 3)."""
+        Y = regressor(dw_r, momentum_columns(w_r, q))
+        dtheta = -self.adaptation_gain * times(transpose(Y), s)
+        return theta_hat + self.control_period * dtheta, times(Y, theta_hat)
+
+
+class _WithRate(GradientGains):
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the initial state: estimates of zero."""
         return State(np.zeros((*measurement.rate.shape[:-1], 9)))
 
-    def _adapted(
-        self, state: State, measurement: Measurement, w_r: Array, dw_r: Array
-    ) -> tuple[State, Array, Array]:
-        """Return the next state, Y theta_hat [N m] and s [rad/s], each (..., 3)."""
-        s = measurement.rate - w_r
-        Y = regressor(dw_r, momentum_columns(w_r, measurement.attitude))
-        dtheta = -self.adaptation_gain * times(transpose(Y), s)
-        after = State(state.theta_hat + self.control_period * dtheta)
-        return after, times(Y, state.theta_hat), s
-
 
 @dataclass(frozen=True, kw_only=True)
-class Passivity(_GradientGains):
+class Passivity(_WithRate):
     """In quaternions: w_r = R_e^T wd - 2 Lambda q_v, q_v of the error's shorter turn, D = Kd.
 
     J.-J. Slotine, W. Li, "On the adaptive control of robot manipulators", International Journal of
@@ -83,14 +83,15 @@ class Passivity(_GradientGains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, TorqueCommand, Signals]:
         """Return the next state, the torque, the error and the estimates."""
-        error = tracking_error(measurement.attitude, measurement.rate, reference)
-        z, kept = manifold(error, self.attitude_gain)
-        after, torque, s = self._adapted(state, measurement, measurement.rate - z, kept)
-        return after, TorqueCommand(torque - self.rate_gain * s), Signals(s, state.theta_hat)
+        q, w = measurement.attitude, measurement.rate
+        s, kept = manifold(tracking_error(q, w, reference), self.attitude_gain)
+        after, torque = self.adapted(state.theta_hat, q, s, w - s, kept)
+        command = TorqueCommand(torque - self.rate_gain * s)
+        return State(after), command, Signals(s, state.theta_hat)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hamiltonian(_GradientGains):
+class Hamiltonian(_WithRate):
     """In roll, pitch and yaw x: x_r' = x_d' + Lambda (x_d - x), w_r = J^-1 x_r', D = J^T Kd J.
 
     J.-J. Slotine, M. D. Di Benedetto, "Hamiltonian adaptive control of spacecraft", IEEE
@@ -114,6 +115,7 @@ class Hamiltonian(_GradientGains):
         dx_r = dxd + self.attitude_gain * error
         ddx_r = ddxd + self.attitude_gain * (dxd - dx)
         w_r, dw_r = body_rate(x, dx_r), body_rate(x, ddx_r) + drift(x, dx, dx_r)
-        after, torque, s = self._adapted(state, measurement, w_r, dw_r)
+        s = w - w_r
+        after, torque = self.adapted(state.theta_hat, measurement.attitude, s, w_r, dw_r)
         damping = self.rate_gain * torque_of(x, dx - dx_r)
-        return after, TorqueCommand(torque - damping), Signals(s, state.theta_hat)
+        return State(after), TorqueCommand(torque - damping), Signals(s, state.theta_hat)
