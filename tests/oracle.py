@@ -13,6 +13,8 @@ from numba import njit
 from mjspace import attitude as att
 from mjspace.contract import Array, Measurement, Reference
 
+_NONE = np.zeros(3)
+
 
 class Flight(NamedTuple):
     """One row for each control instant, the last one included."""
@@ -49,18 +51,20 @@ def fly(
     substeps: int = 1,
     torque_limit: float = np.inf,
     rate_noise: Array | None = None,
+    disturbance: Array = _NONE,
 ) -> Flight:
     """Return the flight of one vehicle under ``law``.
 
     ``H`` (3, 3) is the vehicle's inertia less the wheels' axial inertia ``Jw`` (n,) on
     ``wheel_axes`` (n, 3). The motors turn the torque asked for, cut at ``torque_limit`` [N m] on
     each axis, into -pinv(A) torque. ``rate_noise`` (rows, 3) is added to the measured rate.
+    ``disturbance`` (3,) [N m] is a constant torque from outside, body axes.
     """
     rows = round(duration / period) + 1
     time = period * np.arange(rows)
     wanted = reference.at(time)
     wheels = len(Jw)
-    plant = Plant.of(H, wheel_axes, Jw)
+    plant = Plant.of(H, wheel_axes, Jw, disturbance)
     share = -np.linalg.pinv(wheel_axes.T)
     y = np.concatenate([q0, w0, Omega0]).astype(float)
     history, torques = np.empty((rows, 7 + wheels)), np.empty((rows, 3))
@@ -103,18 +107,19 @@ class Plant(NamedTuple):
     whole: Array  # H0 = H + A Jw A^T, wheels locked
     axes: Array
     Jw: Array
+    disturbance: Array
 
     @classmethod
-    def of(cls, H: Array, wheel_axes: Array, Jw: Array) -> "Plant":
+    def of(cls, H: Array, wheel_axes: Array, Jw: Array, disturbance: Array) -> "Plant":
         whole = H + wheel_axes.T @ np.diag(Jw) @ wheel_axes
-        return cls(np.linalg.inv(H), whole, wheel_axes, Jw)
+        return cls(np.linalg.inv(H), whole, wheel_axes, Jw, disturbance)
 
 
 @njit(cache=True)
 def _derivative(y: Any, motor: Any, plant: Plant, out: Any) -> None:
     """Write y' into ``out``.
 
-    Each motor: Jw (a.w' + Omega') = u. The whole: H0 w' + A Jw Omega' = momentum x w.
+    Each motor: Jw (a.w' + Omega') = u. The whole: H0 w' + A Jw Omega' = momentum x w + d.
     """
     q, w, speed = y[:4], y[4:7], y[7:]
     momentum = np.zeros(3)
@@ -126,7 +131,7 @@ def _derivative(y: Any, motor: Any, plant: Plant, out: Any) -> None:
     net = np.empty(3)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        net[i] = momentum[j] * w[k] - momentum[k] * w[j]
+        net[i] = plant.disturbance[i] + momentum[j] * w[k] - momentum[k] * w[j]
         for n in range(speed.size):
             net[i] -= plant.axes[n, i] * motor[n]
         out[1 + i] = 0.5 * (q[0] * w[i] + q[1 + j] * w[k] - q[1 + k] * w[j])

@@ -12,11 +12,13 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.algebra import cross, dot, matrix_product, times, transpose
-from mjspace.attitude import conjugate, multiply, pure, to_matrix
+from mjspace.algebra import dot, matrix_product, times, transpose
+from mjspace.attitude import conjugate, multiply, pure
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
-from .wheel_momentum import wheel_momentum
+from .excitation import least_eigenvalue
+from .gyrostat import Gyrostat
+from .inertia_regressor import momentum_columns, regressor
 
 
 class IdealState(NamedTuple):
@@ -69,13 +71,16 @@ class AdaptiveState(NamedTuple):
 
 
 class AdaptiveSignals(NamedTuple):
-    """Signals of the adaptive law: those of the gradient law, and the prediction error."""
+    """Signals of the adaptive law: those of the gradient law, prediction error and excitation."""
 
     e: Array
     wd: Array
     theta_hat: Array
     eps: Array
     """Yf theta_hat less the filtered torque [N m], (..., 3)."""
+    excitation: Array
+    """lambda_z of (4.10): the least eigenvalue of Z. All parameters converge only if it stays above
+    zero, (..., 1)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +112,7 @@ class _Contraction(Gains):
 
 
 @dataclass(frozen=True)
-class Ideal(_Contraction):
+class Ideal(Gyrostat, _Contraction):
     """Known inertia: tau = H wd' - p x wd - Kc e, (3.6).
 
     The printed h = R^T hI needs a constant momentum. Here p = H w + sum a Jw (a.w + Omega) from the
@@ -115,13 +120,6 @@ class Ideal(_Contraction):
     """
 
     batched: ClassVar[bool] = True
-
-    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
-    """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
-    wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
-    """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
-    """Axial inertia of each wheel."""
 
     def reset(self, measurement: Measurement, reference: Reference) -> IdealState:
         """Return the initial state, with the sign of q nearer to the reference."""
@@ -132,9 +130,8 @@ class Ideal(_Contraction):
     ) -> tuple[IdealState, TorqueCommand, IdealSignals]:
         """Return the next state, the torque and the errors."""
         q, e, wd, dwd = self._tracking(state.attitude, measurement, reference)
-        H, w = self.inertia, measurement.rate
-        p = times(H, w) + wheel_momentum(self, measurement)
-        torque = times(H, dwd) - cross(p, wd) - self.rate_gain * e  # (3.6)
+        forward = self.torque_for(dwd, self.total_momentum(measurement), wd)
+        torque = forward - self.rate_gain * e  # (3.6)
         return IdealState(q), TorqueCommand(self._limited(torque)), IdealSignals(e, wd)
 
 
@@ -164,7 +161,7 @@ class Gradient(_Contraction):
     ) -> tuple[GradientState, TorqueCommand, GradientSignals]:
         """Return the next state, the torque, the errors and the estimates."""
         q, e, wd, dwd = self._tracking(state.attitude, measurement, reference)
-        Y = _regressor(dwd, _momentum_block(wd, q))
+        Y = regressor(dwd, momentum_columns(wd, q))
         torque = times(Y, state.theta_hat) - self.rate_gain * e  # (4.2)
         dtheta = -self.adaptation_gain * times(transpose(Y), e)  # (4.21), erratum 19
         after = GradientState(q, state.theta_hat + self.control_period * dtheta)
@@ -225,12 +222,12 @@ class Adaptive(_Contraction):
         w, T = measurement.rate, self.control_period
         q, e, wd, dwd = self._tracking(attitude, measurement, reference)
 
-        Y = _regressor(dwd, _momentum_block(wd, q))
+        Y = regressor(dwd, momentum_columns(wd, q))
         torque = self._limited(times(Y, theta_hat) - self.rate_gain * e)  # (4.2)
 
         # The filter lF/(s + lF) of (2.41)-(2.44); the derivative of the filtered rate replaces w'.
-        dw_f, dP_f, dt_f = lF * (w - w_f), lF * (_momentum_block(w, q) - P_f), lF * (torque - t_f)
-        Yf = _regressor(dw_f, P_f)
+        dw_f, dP_f, dt_f = lF * (w - w_f), lF * (momentum_columns(w, q) - P_f), lF * (torque - t_f)
+        Yf = regressor(dw_f, P_f)
         eps = times(Yf, theta_hat) - t_f  # (4.8), (4.9)
 
         dtheta = -ga * (da * g + times(transpose(Y), e))  # (4.5)
@@ -240,7 +237,8 @@ class Adaptive(_Contraction):
 
         changes = (dtheta, dg, dZ, dw_f, dP_f, dt_f)
         after = AdaptiveState(q, *(x + T * dx for x, dx in zip(state[1:], changes, strict=True)))
-        return after, TorqueCommand(torque), AdaptiveSignals(e, wd, theta_hat, eps)
+        signals = AdaptiveSignals(e, wd, theta_hat, eps, least_eigenvalue(Z))
+        return after, TorqueCommand(torque), signals
 
 
 def _nearer(measurement: Measurement, reference: Reference) -> Array:
@@ -261,18 +259,3 @@ def _rate(q: Array, w: Array) -> Array:
 def _along(q: Array, u: Array) -> Array:
     """Return J(q)^T u, (..., 3): the vector part of conj(q) u."""
     return multiply(conjugate(q), u)[..., 1:]
-
-
-def _momentum_block(w: Array, q: Array) -> Array:
-    """Return S(w) R(q)^T, (..., 3, 3), of (2.40): w x each inertial axis, a column in body axes."""
-    return transpose(cross(w[..., None, :], to_matrix(q)))
-
-
-_W6 = np.array([[0, 1, 2, 3, 3, 3], [3, 0, 3, 1, 2, 3], [3, 3, 0, 3, 1, 2]])
-"""Where a1 a2 a3 0 stand in W6(a), with W6(a) [m11 m12 m13 m22 m23 m33] = M a."""
-
-
-def _regressor(a: Array, block: Array) -> Array:
-    """Return Y = [W6(a), block], (2.40), (..., 3, 9)."""
-    components = np.concatenate([a, np.zeros_like(a[..., :1])], axis=-1)
-    return np.concatenate([components[..., _W6], block], axis=-1)

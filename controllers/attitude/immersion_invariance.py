@@ -14,9 +14,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numba import njit
 
-from mjspace import attitude as att
-from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
+from mjspace.attitude import to_euler_zyx
+from mjspace.contract import Array, Measurement, Reference, TorqueCommand, gain
 from mjspace.gufunc import gufunc
+
+from .euler_kinematics import unwrapped
+from .gyrostat import Gyrostat
 
 
 class State(NamedTuple):
@@ -40,7 +43,7 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ImmersionInvariance(Gains):
+class ImmersionInvariance(Gyrostat):
     """Law (15) of paper 000, with p = R^T p_r (erratum 2) computed from the tachometers.
 
     The torque H J^-1 (v - J' w) - p x w, v = x_d'' + (K + Gamma) x_e' + Gamma K x_e, makes
@@ -49,12 +52,6 @@ class ImmersionInvariance(Gains):
 
     batched: ClassVar[bool] = True
 
-    inertia: Array = gain("kg m^2", (3, 3), form="inertia")
-    """H: of the vehicle less its wheels' axial inertia, about its centre of mass, body axes."""
-    wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
-    """Unit spin axes, body axes, one row for each wheel."""
-    wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
-    """Axial inertia of each wheel."""
     target_gain: float = gain("1/s", default=10.0, above=0.0)
     """K: rate of the target system x_e' = -K x_e."""
     manifold_gain: float = gain("1/s", default=5.0, above=0.0)
@@ -64,10 +61,9 @@ class ImmersionInvariance(Gains):
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the initial state, the measured angles unwrapped to ``unwrap_from``."""
-        angles = att.to_euler_zyx(measurement.attitude)
-        turns = np.rint((angles - self.unwrap_from) / (2.0 * pi))
-        desired = np.broadcast_to(att.to_euler_zyx(reference.attitude), angles.shape)
-        return State(angles - 2.0 * pi * turns, desired.copy())
+        angles = unwrapped(measurement.attitude, self.unwrap_from)
+        desired = np.broadcast_to(to_euler_zyx(reference.attitude), angles.shape)
+        return State(angles, desired.copy())
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
@@ -86,7 +82,7 @@ class ImmersionInvariance(Gains):
 
 
 @njit
-def _unwrapped(angle: Any, before: Any) -> Any:
+def _nearest(angle: Any, before: Any) -> Any:
     """Return ``angle`` plus the whole turns that bring it nearest to ``before``."""
     return angle - 2.0 * pi * np.rint((angle - before) / (2.0 * pi))
 
@@ -98,7 +94,7 @@ def _euler(q: Any, before: Any) -> Any:
     across, down = 2.0 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
     pitch = np.arctan2(2.0 * (q0 * q2 - q1 * q3), np.sqrt(across * across + down * down))
     yaw = np.arctan2(2.0 * (q1 * q2 + q0 * q3), q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3)
-    return _unwrapped(np.arctan2(across, down), before[0]), pitch, _unwrapped(yaw, before[2])
+    return _nearest(np.arctan2(across, down), before[0]), pitch, _nearest(yaw, before[2])
 
 
 @njit

@@ -13,10 +13,10 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.algebra import components, cross, dot, times, transpose
-from mjspace.attitude import conjugate, multiply, to_matrix
+from mjspace.algebra import cross, dot, times
 from mjspace.contract import Array, Gains, Measurement, Reference, TorqueCommand, gain
 
+from .tracking_error import tracking_error
 from .wheel_momentum import wheel_momentum
 
 
@@ -83,36 +83,6 @@ def commanded_torque(
     return feedforward + feedback + _compensation(s, tbar, eps), sigma_e, s
 
 
-class _Errors(NamedTuple):
-    """Of the measured motion, and the desired one in body axes."""
-
-    sigma_e: Array
-    w_e: Array
-    wb: Array
-    """R_e^T wd [rad/s]."""
-    dwd_b: Array
-    """R_e^T wd' [rad/s^2]."""
-
-
-def _errors(attitude: Array, rate: Array, reference: Reference) -> _Errors:
-    error = _shorter(multiply(conjugate(reference.attitude), attitude))
-    sigma_e = error[..., 1:] / (1.0 + error[..., :1])  # (3.5), erratum E9
-    R_eT = transpose(to_matrix(error))
-    wb = times(R_eT, reference.rate)
-    return _Errors(sigma_e, rate - wb, wb, times(R_eT, reference.acceleration))
-
-
-def _shorter(error: Array) -> Array:
-    """Return the error quaternion or its negative, of the smaller angle, (..., 4).
-
-    At 180 deg its scalar is zero and both signs are valid: the sign is then chosen by the vector,
-    so that q and -q give the same result.
-    """
-    w, x, y, z = components(error)
-    first = np.where(w != 0.0, w, np.where(x != 0.0, x, np.where(y != 0.0, y, z)))
-    return np.where(first < 0.0, -error, error)
-
-
 def _modified(
     attitude: Array,
     rate: Array,
@@ -123,7 +93,7 @@ def _modified(
     kc: float,
 ) -> tuple[Array, Array, Array, Array]:
     """Return sigma_e, s, the feedforward and the feedback of (3.7), each (..., 3)."""
-    sigma_e, w_e, wb, dwd_b = _errors(attitude, rate, reference)
+    _, sigma_e, w_e, wb, dwd_b = tracking_error(attitude, rate, reference)  # (3.5), E9
     wr = wb - 2.0 * lam * sigma_e  # (3.8)
     s = w_e + 2.0 * lam * sigma_e
     square = dot(sigma_e, sigma_e)
@@ -167,7 +137,9 @@ class Classical(Gains):
     ) -> tuple[State, TorqueCommand, ClassicalSignals]:
         """Return the torque, the errors and the parts of the torque."""
         M = self.inertia
-        sigma_e, w_e, wb, dwd_b = _errors(measurement.attitude, measurement.rate, reference)
+        _, sigma_e, w_e, wb, dwd_b = tracking_error(
+            measurement.attitude, measurement.rate, reference
+        )
         feedforward = times(M, dwd_b) + cross(wb, times(M, wb))
         feedback = -self.attitude_gain * sigma_e - self.rate_gain * w_e
         signals = ClassicalSignals(sigma_e, w_e, feedforward, feedback)

@@ -242,7 +242,7 @@ PROPERTIES = (
 
 
 def test_the_laws_are_found() -> None:
-    assert len(laws()) >= 33
+    assert len(laws()) >= 43
     assert {"contraction:Ideal", "lander:VariableStructure", "phases:Phases"} <= set(laws())
 
 

@@ -191,6 +191,14 @@ def test_a_fixed_axis_leaves_the_momentum_along_it_unknown() -> None:
     np.testing.assert_allclose(of.states["theta_hat"][-1], START, atol=1e-3)
 
 
+def test_excitation_is_the_least_eigenvalue_of_the_information() -> None:
+    of = adaptive_sweep()
+    least = of.signals["excitation"][:, 0]
+    np.testing.assert_allclose(least, np.linalg.eigvalsh(of.states["Z"])[:, 0], atol=1e-13)
+    assert least.max() == pytest.approx(2.4e-3, abs=5e-5)
+    assert of.time[least.argmax()] == pytest.approx(4.3, abs=0.1)
+
+
 def test_g_is_information_times_error() -> None:
     """The invariant behind (4.6): g = Z (theta_hat - theta), exact in continuous time."""
     broken = []
