@@ -5,7 +5,7 @@ import tomllib
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
@@ -19,6 +19,8 @@ from mjspace.scenario.scenario import Check
 from mjspace.signals import find_signal
 from mjspace.simulation.assembly import assemble
 
+Verdicts = Literal["holds", "holds corrected", "does not hold", "not flown"]
+VERDICTS = get_args(Verdicts)
 FILES = sorted((Path(__file__).parent / "papers").glob("*.toml"))
 _UNIT = re.compile(r" \[([^]]*)\]$")
 
@@ -89,7 +91,7 @@ class Claim(Entry):
 
     claim: str
     where: str
-    verdict: Literal["holds", "holds corrected", "does not hold", "not flown"]
+    verdict: Verdicts
     because: str = ""
     measured: list[Measured] = []
     errata: list[str] = []

@@ -8,6 +8,7 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from paper_claims import Curve, Panel, Picture
 from PIL import Image
 
@@ -19,8 +20,8 @@ from mjspace.signals import find_signal, magnitude
 
 NAMED = {"red": COLORS[0], "black": INK, "blue": COLORS[2]}
 WIDTH, ROW, DPI = 9.0, 2.5, 110
-INKS = 128
-"""Colors in a file, which is a quarter as large as with all of them."""
+INKS = 255
+"""Colors in a file, which has a palette: a third of the size."""
 POINTS = 3000
 """At most so many are drawn of a curve that is not a path."""
 
@@ -65,6 +66,7 @@ def _draw(axes: Any, panel: Panel, logs: Mapping[str, Log]) -> None:
     else:
         end = panel.end or max(logs[curve.flight].end for curve in panel.curves)
         axes.set_xlim(panel.start, end)
+        axes.xaxis.set_major_locator(MaxNLocator(6))
         axes.set_xlabel("time [s]", fontsize=8)
     if any(curve.labels for curve in panel.curves):
         where = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}

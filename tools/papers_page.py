@@ -7,11 +7,12 @@ and is judged as the checks of any flight are; one that does not come out as exp
 so that no verdict outlives its flight.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from paper_claims import Claim, Number, Paper, fly, papers
+from paper_claims import VERDICTS, Claim, Number, Paper, fly, papers
 from paper_figures import draw
 
 from mjspace.log.reader import Log
@@ -34,7 +35,8 @@ What was measured names its signal and its flight, where that is another than th
 [scenario](scenarios.md), or one with the changes that are listed below its table. Each number is
 that of a check with bounds, judged on every control period. This page and its figures are written
 by `python tools/papers_page.py` from `tools/papers/` and the flights, which take some minutes. In
-the figures components 1, 2 and 3 are red, green and blue.
+the figures components 1, 2 and 3 are red, green and blue. Errata have the numbers that scenarios
+and laws cite.
 """
 Numbers = Mapping[tuple[str, str], Sequence[Number]]
 """What was measured, by paper and flight, in the order of the paper's entries."""
@@ -42,7 +44,11 @@ Numbers = Mapping[tuple[str, str], Sequence[Number]]
 
 def page(of: Sequence[Paper], numbers: Numbers) -> str:
     """Return the page, with these numbers."""
-    lines = [HEAD]
+    lines = [HEAD, f"| | {' | '.join(VERDICTS)} |", "|---|" + "---|" * len(VERDICTS)]
+    for paper in of:
+        counts = [sum(claim.verdict == each for claim in paper.claims) for each in VERDICTS]
+        lines += [f"| [{paper.title}](#{_slug(paper.title)}) | {' | '.join(map(str, counts))} |"]
+    lines += [""]
     for paper in of:
         lines += [f"## {paper.title}", "", f"{paper.source}. {paper.remark}", ""]
         lines += ["| claim | where | what was measured | verdict |", "|---|---|---|---|"]
@@ -57,6 +63,10 @@ def page(of: Sequence[Paper], numbers: Numbers) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
+def _slug(title: str) -> str:
+    return re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
+
+
 def _row(paper: Paper, claim: Claim, left: Mapping[str, Iterator[Number]]) -> str:
     measured, before = [], ""
     for one in claim.measured:
@@ -68,7 +78,8 @@ def _row(paper: Paper, claim: Claim, left: Mapping[str, Iterator[Number]]) -> st
         before = one.flight
     verdict = f"**{claim.verdict}**" + f": {claim.because}" * bool(claim.because)
     if claim.errata:
-        verdict += f" (erratum {', '.join(claim.errata)})"
+        word = "erratum" if len(claim.errata) == 1 else "errata"
+        verdict += f" ({word} {', '.join(claim.errata)})"
     cells = (claim.claim, claim.where, "<br>".join(measured), verdict)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
