@@ -127,8 +127,8 @@ A motion about several axes, ours, for 40 s:
   are one to second order of the attitude error: their desired rates differ by its square.
 - **The Hamiltonian law** (Slotine and Di Benedetto 1990) is the same in Euler angles. On these
   manoeuvres it tracks as well. On a sweep of 120 deg about y, through a pitch of 90 deg, its flight
-  ends so: {over_y}. The passivity-based law has an error of {passive_y:.1e} rad
-  at most there.
+  ends so: {over_y}.
+  The passivity-based law has an error of {passive_y:.1e} rad at most there.
 - **Without a gyro**, what 002 leaves for later, the passivity-based law tracks as well as with one
   (`adaptive-output-feedback`). The rate is linear in 24 constants of inertia and momentum, and the
   proof covers its convergence under any bounded motion; that of the whole is not proved, and the
@@ -153,6 +153,8 @@ attitude error [rad]:
 002's proof is for constant parameters. With its forgetting of 0.1 1/s the estimates lag by some ten
 seconds, and are right again half a minute after the boom stops; without forgetting, the motion of
 before still counts at the end. The law with the stowed inertia keeps its error.
+
+![The attitude error, the excitation and the estimates of contraction-boom](contraction_boom.png)
 """
 
 
