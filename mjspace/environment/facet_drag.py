@@ -13,8 +13,9 @@ from mjspace.environment.bodies import Bodies, add_force_on_bus, in_bus_axes
 from mjspace.environment.compiled import compiled
 from mjspace.environment.constants import RADIUS
 from mjspace.environment.dipole import EARTH_ROTATION
+from mjspace.environment.facets import Facet
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Finite, Meters3, Positive, Si, Switch, Table, Unit3
+from mjspace.scenario.fields import Finite, Positive, Si, Switch
 
 _KM = 1e3
 ATMOSPHERE = np.array(
@@ -75,25 +76,6 @@ def drag(payload: Any, time: float, bodies: Bodies) -> None:
             add_force_on_bus(bodies, arm, (scale * ux, scale * uy, scale * uz))
 
 
-class Facet(Table):
-    """A flat facet of the bus; what is behind another one is not shadowed by it."""
-
-    area: Annotated[Positive, Si("m^2")]
-    """Of one side."""
-    normal: Unit3
-    """Outward, body axes; normalized."""
-    position: Meters3
-    """Of its centre of pressure, body axes, from the bus's origin."""
-    drag_coefficient: Positive = 2.2
-    """About 2 to 2.5 in free-molecular flow."""
-
-    @property
-    def outward(self) -> Array:
-        """The unit normal."""
-        normal: Array = np.array(self.normal)
-        return normal / np.linalg.norm(normal)
-
-
 class FacetDrag(Term):
     """Drag on flat facets of the bus in orbit, in free-molecular flow.
 
@@ -102,9 +84,10 @@ class FacetDrag(Term):
     """
 
     kernels: ClassVar = {9: drag}
+    reads: ClassVar = {"orbit": 1}
 
-    facets: Annotated[list[Facet], Field(min_length=1)]
-    """Each feels the flow on its outward side."""
+    facets: Annotated[list[Facet], Field(min_length=1)] | None = None
+    """Each feels the flow on its outward side; those of the environment when left out."""
     density: Annotated[Positive, Si("kg/m^3")] | None = None
     """Constant or, with ``scale_height``, at ``reference_altitude``; the default atmosphere's when
     left out."""
@@ -128,6 +111,10 @@ class FacetDrag(Term):
         orbit = environment.orbit
         if orbit is None:
             raise ValueError("facet_drag: needs an orbit")
+        if (self.facets is None) == (not environment.facets):
+            raise ValueError(
+                "facet_drag: needs [[environment.facets]], or facets of its own, not both"
+            )
         if self.density is not None:
             return
         if orbit.body != "earth":
@@ -138,9 +125,9 @@ class FacetDrag(Term):
                 f"{ATMOSPHERE[0, 0]:g} km, where the atmosphere's table begins: give a density"
             )
 
-    def payload_size(self) -> int:
+    def payload_size(self, environment: Environment) -> int:
         """Return the size of the parameters of ``drag``."""
-        return _FACETS + _WIDTH * len(self.facets)
+        return _FACETS + _WIDTH * len(self.facets or environment.facets)
 
     def pack(self, model: Any, environment: Environment) -> Array:
         """Return the parameters of ``drag``."""
@@ -151,7 +138,7 @@ class FacetDrag(Term):
         air = [RADIUS[orbit.body] + altitude, density, 1.0 / scale_height, rotation]
         facets = [
             [0.5 * facet.drag_coefficient * facet.area, *facet.outward, *facet.position]
-            for facet in self.facets
+            for facet in self.facets or environment.facets
         ]
         return np.concatenate([[place], orbit.elements(), air, *facets])
 
