@@ -22,7 +22,7 @@ from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
-from mjspace.simulation.known_beforehand import Known, cubics_in, known_of
+from mjspace.simulation.known_beforehand import Known, known_of, seen_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
 from mjspace.vehicle.vehicle import Vehicle, build, driven_by, initial_state
@@ -51,7 +51,7 @@ class Assembly:
     """The environment's parameters, one row (nuserdata,)."""
     known: Mapping[str, Known]
     """What is known of the environment as a function of time: the magnetic field, the Sun's
-    position, a drifting orbit's elements."""
+    position, the air's density, a drifting orbit's elements."""
     actuators: ActuatorSet
     reference: ReferenceSource
     law: Law
@@ -86,7 +86,7 @@ class Assembly:
             | {f"{n}_closed": OwnSensor(1, "", False) for n in self.scenario.plant.connections},
             gravity=self._gravity,
             orbit_position=None if orbit is None else partial(orbit_position, orbit),
-            **{name: one.at for name, one in cubics_in(self.known).items()},
+            **{name: one.at for name, one in seen_of(self.known).items()},
         )
 
     @property

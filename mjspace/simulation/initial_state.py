@@ -66,7 +66,7 @@ def state_of_log(assembly: Assembly, physics: Array) -> Array:
 
     ``userdata`` tells the native callbacks which memory to read and write. Of a log, which may be a
     stranger's, only what changes in flight is taken: the magnetic field, the Sun's position, the
-    elements of a drifting orbit, the moment, and the states of connections.
+    air's density, the elements of a drifting orbit, the moment, and the states of connections.
 
     Raises:
         InputError: a number of it is not finite.

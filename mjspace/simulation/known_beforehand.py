@@ -1,7 +1,7 @@
 """What is known of the environment as a function of time, as a step effect: what holds now.
 
-The magnetic field and the Sun's position, each a cubic of time, and the elements of an orbit that
-drifts.
+The magnetic field, the Sun's position and the air's density, each a cubic of time, and the elements
+of an orbit that drifts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.environment.cubics import Cubics, value_of
+from mjspace.environment.cubics import value_of
 from mjspace.environment.install import places_read
 from mjspace.scenario.scenario import Scenario
 from mjspace.sensors.base import Surroundings
@@ -27,10 +27,7 @@ class Known(Protocol):
 
 
 def known_of(scenario: Scenario) -> dict[str, Known]:
-    """Return what is known of the scenario's environment, by the names that terms read it under.
-
-    Cubics are also fields of ``Surroundings``.
-    """
+    """Return what is known of the scenario's environment, by the names that terms read it under."""
     environment, control, duration = (
         scenario.environment,
         scenario.rates.control,
@@ -45,14 +42,18 @@ def known_of(scenario: Scenario) -> dict[str, Known]:
         from mjspace.environment import sun
 
         found["sun_position"] = sun.along(environment.epoch, control, duration)
+    if environment.facet_drag is not None and environment.facet_drag.nrlmsis is not None:
+        from mjspace.environment import nrlmsis
+
+        found["air_density"] = nrlmsis.along(environment, control, duration)
     if environment.orbit is not None and environment.orbit.j2:
         found["orbit"] = environment.orbit
     return found
 
 
-def cubics_in(known: Mapping[str, Known]) -> dict[str, Cubics]:
-    """Return the vectors that are cubics of time."""
-    return {name: one for name, one in known.items() if isinstance(one, Cubics)}
+def seen_of(known: Mapping[str, Known]) -> dict[str, Any]:
+    """Return the cubics that are fields of ``Surroundings``."""
+    return {name: known[name] for name in ("magnetic_field", "sun_position") if name in known}
 
 
 def changing(known: Mapping[str, Known], scenario: Scenario) -> list[slice]:
@@ -119,6 +120,6 @@ class KnownBeforehand(StepEffect):
     def around(self, surroundings: Surroundings, known: Array) -> Surroundings:
         """Return surroundings with the vectors of those cubics."""
         vectors: dict[str, Any] = {
-            name: partial(value_of, known[self._columns[name]]) for name in cubics_in(self._known)
+            name: partial(value_of, known[self._columns[name]]) for name in seen_of(self._known)
         }
         return replace(surroundings, **vectors)
