@@ -166,6 +166,10 @@ class Truth(NamedTuple):
     """Of the frame's origin from the planet's centre, inertial axes [m], shape (3,)."""
     orbit_velocity: Annotated[Array, Unit("m/s")]
     """Of the frame's origin, inertial axes [m/s], shape (3,)."""
+    sun_direction: Array
+    """Unit vector from the bus to the Sun, body axes, shape (3,)."""
+    sunlight: Array
+    """Part of the Sun's disc that the Earth's shadow leaves visible, 0 to 1, shape (1,)."""
 
 
 class Reference(NamedTuple):

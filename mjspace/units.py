@@ -53,6 +53,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "kg m^2": ("kg m^2", 1.0),
     "g mm^2": ("kg m^2", 1e-9),
     "N": ("N", 1.0),
+    "N/m^2": ("N/m^2", 1.0),
     "N m": ("N m", 1.0),
     "mN m": ("N m", 1e-3),
     "uN m": ("N m", 1e-6),

@@ -28,6 +28,10 @@ class Term(Table, ABC):
     """By the number of its kind of block, which stands in logs and is never used again for another:
     a compiled function of (payload, time [s], ``bodies.Bodies``) that adds to ``qfrc_passive``."""
 
+    reads: ClassVar[Mapping[str, int]] = {}
+    """What is written into its parameters in flight, of what ``Assembly.known`` has, by name, and
+    where it begins in them."""
+
     def block_kind(self) -> int:
         """Return which of the ``kernels`` acts; to be overridden where there are several."""
         (kind,) = self.kernels
@@ -41,14 +45,17 @@ class Term(Table, ABC):
         """
 
     @abstractmethod
-    def payload_size(self) -> int:
-        """Return how many numbers ``pack`` returns; the model is not compiled yet."""
+    def payload_size(self, environment: Environment) -> int:
+        """Return how many numbers ``pack`` returns; the model is not compiled yet.
+
+        ``environment`` is all that acts.
+        """
 
     @abstractmethod
     def pack(self, model: Any, environment: Environment) -> Array:
         """Return the kernel's parameters, shape (payload_size,).
 
-        ``model`` is the compiled ``mujoco.MjModel``, ``environment`` all that acts.
+        ``model`` is the compiled ``mujoco.MjModel``.
 
         Raises:
             ValueError: the model lacks what the term acts on.

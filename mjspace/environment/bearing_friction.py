@@ -56,7 +56,7 @@ class BearingFriction(Term):
             rough = fitted.dry_friction() | rough
         return [cls(frictions=rough)] if rough else []
 
-    def payload_size(self) -> int:
+    def payload_size(self, environment: Environment) -> int:
         """Return five numbers for each hinge."""
         return 5 * len(self.frictions)
 

@@ -264,7 +264,7 @@ class Latch(Term):
         """Return one for each of the plant's connections, in their order."""
         return [cls(name=name, table=table) for name, table in plant.connections.items()]
 
-    def payload_size(self) -> int:
+    def payload_size(self, environment: Environment) -> int:
         """Return the size of what ``pack`` returns."""
         return _FIXED + _SPRING * len(self._springs())
 

@@ -10,4 +10,9 @@ RADIUS = {  # [m]
     "moon": 1737400.0,  # mean; Archinal et al. 2018, IAU WGCCRE report 2015, table 5
 }
 
+J2 = {"earth": 1.0826359e-3}  # oblateness; IERS Conventions (2010), Technical Note 36, table 1.1
+
+ASTRONOMICAL_UNIT = 149597870700.0  # m; IAU 2012, resolution B2
+SUN_RADIUS = 6.957e8  # m; nominal, IAU 2015, resolution B3
+
 STANDARD_GRAVITY = 9.80665  # m/s^2; CGPM 1901, resolution 2: for specific impulse

@@ -73,7 +73,7 @@ class DisturbanceTorque(Term):
         """Return which kernel turns the components into torques about the bus's axes."""
         return 2 if self.frame == "body" else 3
 
-    def payload_size(self) -> int:
+    def payload_size(self, environment: Environment) -> int:
         """Return the size of the series of ``torque_at``."""
         return 3 + 7 * len(self.sines)
 

@@ -7,14 +7,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mjspace.contract import Array
-from mjspace.environment import joints, kepler
+from mjspace.environment import cubics, joints, kepler
 from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies, add_force_on_bus, in_bus_axes
 from mjspace.environment.compiled import compiled
 from mjspace.environment.constants import RADIUS
 from mjspace.environment.dipole import EARTH_ROTATION
+from mjspace.environment.facets import Facet
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Finite, Meters3, Positive, Si, Switch, Table, Unit3
+from mjspace.scenario.fields import Finite, NonNegative, Positive, Si, Switch, Table
 
 _KM = 1e3
 ATMOSPHERE = np.array(
@@ -39,32 +40,69 @@ ATMOSPHERE = np.array(
 Astrodynamics and Applications, 4th edition, 2013, table 8-4. The Sun's activity changes the density
 by a factor of up to ten."""
 
-_FACETS = 15  # index of the first facet in the payload
+_FACETS = 15  # index of the first facet in the payload of drag
+_AIR = 11  # index of the density's cubic in the other's
+_FACETS_ALONG = _AIR + cubics.SIZE + 1
 _WIDTH = 7  # numbers of a facet
 
 
 @compiled
 def drag(payload: Any, time: float, bodies: Bodies) -> None:
-    """Add the drag on each facet that faces the flow: -1/2 rho C A (n . v) v.
-
-    v is the velocity of the facet relative to the air, n its outward normal, C its drag
-    coefficient (Wertz 1978, Spacecraft Attitude Determination and Control, equation 17-57).
+    """Add the drag in air whose density is exponential in altitude.
 
     ``payload``: the bus's place in ``qpos``, the orbit's elements (10), the radius [m] at which the
     density [kg/m^3] is the next number, one over the scale height [1/m], the rate [rad/s] at which
-    the air turns with the planet about z. Then for each facet half of C A [m^2], n (3) and the
-    centre of pressure (3) [m], body axes.
+    the air turns with the planet about z, then the facets as ``add_drag`` has them.
     """
-    place, dof = int(payload[0]), bodies.bus_dof
-    x, y, z = kepler.position(payload[1:11], time)
-    x, y, z = x + bodies.qpos[place], y + bodies.qpos[place + 1], z + bodies.qpos[place + 2]
+    x, y, z = place_of(payload, time, bodies)
     altitude = math.sqrt(x * x + y * y + z * z) - payload[11]
     density = payload[12] * math.exp(-altitude * payload[13])
+    flow = payload[14] * y, -payload[14] * x
+    add_drag(payload, time, bodies, density, flow, _FACETS)
+
+
+@compiled
+def drag_along(payload: Any, time: float, bodies: Bodies) -> None:
+    """Add the drag in air whose density is known along the orbit.
+
+    ``payload``: the bus's place in ``qpos``, the orbit's elements (10), a cubic of time as
+    ``nrlmsis.along`` makes it, the rate [rad/s] at which the air turns with the planet about z,
+    then the facets as ``add_drag`` has them.
+    """
+    x, y, z = place_of(payload, time, bodies)
+    air, since = payload[_AIR:_FACETS_ALONG], time - payload[_AIR]
+    higher = math.sqrt(x * x + y * y + z * z) - cubics.component(air, 1, since)
+    falling = cubics.component(air, 2, since)
+    density = math.exp(cubics.component(air, 0, since) - higher * falling)
+    flow = air[cubics.SIZE] * y, -air[cubics.SIZE] * x
+    add_drag(payload, time, bodies, density, flow, _FACETS_ALONG)
+
+
+@compiled
+def place_of(payload: Any, time: float, bodies: Bodies) -> tuple[float, float, float]:
+    """Return the bus's place [m] from the planet's centre, inertial axes."""
+    place = int(payload[0])
+    x, y, z = kepler.position(payload[1:11], time)
+    return x + bodies.qpos[place], y + bodies.qpos[place + 1], z + bodies.qpos[place + 2]
+
+
+@compiled
+def add_drag(
+    payload: Any, time: float, bodies: Bodies, density: float, flow: Any, first: int
+) -> None:
+    """Add the drag on each facet that faces the flow: -1/2 rho C A (n . v) v.
+
+    v is the velocity of the facet relative to the air, n its outward normal, C its drag
+    coefficient (Wertz 1978, Spacecraft Attitude Determination and Control, equation 17-57). For
+    each facet the ``payload`` has, from ``first`` on, half of C A [m^2], n (3) and the centre of
+    pressure (3) [m], body axes; ``flow`` is what the air's turn adds to v, x and y [m/s].
+    """
+    dof = bodies.bus_dof
     vx, vy, vz = kepler.velocity(payload[1:11], time)
     vx, vy, vz = vx + bodies.qvel[dof], vy + bodies.qvel[dof + 1], vz + bodies.qvel[dof + 2]
-    vx, vy, vz = in_bus_axes(bodies, vx + payload[14] * y, vy - payload[14] * x, vz)
+    vx, vy, vz = in_bus_axes(bodies, vx + flow[0], vy + flow[1], vz)
     wx, wy, wz = bodies.qvel[dof + 3], bodies.qvel[dof + 4], bodies.qvel[dof + 5]
-    for i in range(_FACETS, payload.size, _WIDTH):
+    for i in range(first, payload.size, _WIDTH):
         n, arm = payload[i + 1 : i + 4], payload[i + 4 : i + 7]
         ux = vx + wy * arm[2] - wz * arm[1]
         uy = vy + wz * arm[0] - wx * arm[2]
@@ -75,36 +113,34 @@ def drag(payload: Any, time: float, bodies: Bodies) -> None:
             add_force_on_bus(bodies, arm, (scale * ux, scale * uy, scale * uz))
 
 
-class Facet(Table):
-    """A flat facet of the bus; what is behind another one is not shadowed by it."""
+class Nrlmsis(Table):
+    """NRLMSIS 2.1: the density at the epoch's date, place and local time, for a given Sun."""
 
-    area: Annotated[Positive, Si("m^2")]
-    """Of one side."""
-    normal: Unit3
-    """Outward, body axes; normalized."""
-    position: Meters3
-    """Of its centre of pressure, body axes, from the bus's origin."""
-    drag_coefficient: Positive = 2.2
-    """About 2 to 2.5 in free-molecular flow."""
+    f107: Positive
+    """Solar flux at 10.7 cm of the day before, in 1e-22 W/(m^2 Hz): 70 to 250."""
+    f107a: Positive | None = None
+    """Its mean over 81 days; ``f107`` when left out."""
+    ap: NonNegative = 4.0
+    """Daily geomagnetic index: 4 is quiet, 100 a storm."""
 
     @property
-    def outward(self) -> Array:
-        """The unit normal."""
-        normal: Array = np.array(self.normal)
-        return normal / np.linalg.norm(normal)
+    def mean_f107(self) -> float:
+        """The mean of the flux."""
+        return self.f107 if self.f107a is None else self.f107a
 
 
 class FacetDrag(Term):
     """Drag on flat facets of the bus in orbit, in free-molecular flow.
 
-    The air's density is constant or exponential in altitude. By default it is that of a mean Earth
-    atmosphere (Vallado 2013, table 8-4), the exponential at the periapsis for all altitudes.
+    The air's density is constant, exponential in altitude, or that of ``nrlmsis``. By default it is
+    that of a mean Earth atmosphere (Vallado 2013, table 8-4), the exponential at the periapsis for
+    all altitudes.
     """
 
-    kernels: ClassVar = {9: drag}
+    kernels: ClassVar = {9: drag, 13: drag_along}
 
-    facets: Annotated[list[Facet], Field(min_length=1)]
-    """Each feels the flow on its outward side."""
+    facets: Annotated[list[Facet], Field(min_length=1)] | None = None
+    """Each feels the flow on its outward side; those of the environment when left out."""
     density: Annotated[Positive, Si("kg/m^3")] | None = None
     """Constant or, with ``scale_height``, at ``reference_altitude``; the default atmosphere's when
     left out."""
@@ -112,6 +148,8 @@ class FacetDrag(Term):
     """Above a sphere of the planet's equatorial radius. Goes with ``scale_height``."""
     scale_height: Annotated[Positive, Si("m")] | None = None
     """Altitude over which the density falls to 1/e; infinite when left out."""
+    nrlmsis: Nrlmsis | None = None
+    """The density of NRLMSIS 2.1 along the orbit instead of these."""
     corotating: Switch = True
     """Whether the air turns with the Earth; otherwise it does not turn in inertial axes."""
 
@@ -121,14 +159,33 @@ class FacetDrag(Term):
             raise ValueError("reference_altitude and scale_height: give both or neither")
         if self.scale_height is not None and self.density is None:
             raise ValueError("scale_height: needs the density at reference_altitude")
+        if self.nrlmsis is not None and self.density is not None:
+            raise ValueError("density and nrlmsis: give one of them")
         return self
+
+    @property
+    def reads(self) -> dict[str, int]:  # type: ignore[override]
+        """What is written into its parameters in flight."""
+        return {"orbit": 1} | ({} if self.nrlmsis is None else {"air_density": _AIR})
+
+    def block_kind(self) -> int:
+        """Return which kernel knows the density."""
+        return 9 if self.nrlmsis is None else 13
 
     def check_environment(self, environment: Environment) -> None:
         """Refuse a vehicle that is not in orbit or where no atmosphere is known."""
         orbit = environment.orbit
         if orbit is None:
             raise ValueError("facet_drag: needs an orbit")
-        if self.density is not None:
+        if (self.facets is None) == (not environment.facets):
+            raise ValueError(
+                "facet_drag: needs [[environment.facets]], or facets of its own, not both"
+            )
+        if self.nrlmsis is not None and not environment.has_sun:
+            raise ValueError(
+                'facet_drag.nrlmsis: needs environment.epoch and an orbit with body = "earth"'
+            )
+        if self.density is not None or self.nrlmsis is not None:
             return
         if orbit.body != "earth":
             raise ValueError(f"facet_drag.density: none is known of the {orbit.body}: give one")
@@ -138,22 +195,26 @@ class FacetDrag(Term):
                 f"{ATMOSPHERE[0, 0]:g} km, where the atmosphere's table begins: give a density"
             )
 
-    def payload_size(self) -> int:
-        """Return the size of the parameters of ``drag``."""
-        return _FACETS + _WIDTH * len(self.facets)
+    def payload_size(self, environment: Environment) -> int:
+        """Return the size of the kernel's parameters."""
+        first = _FACETS if self.nrlmsis is None else _FACETS_ALONG
+        return first + _WIDTH * len(self.facets or environment.facets)
 
     def pack(self, model: Any, environment: Environment) -> Array:
-        """Return the parameters of ``drag``."""
+        """Return the kernel's parameters; a cubic is written as the vehicle flies."""
         orbit: Any = environment.orbit
-        altitude, density, scale_height = self._atmosphere(orbit)
         rotation = EARTH_ROTATION if self.corotating and orbit.body == "earth" else 0.0
         _, place = joints.bus(model)
-        air = [RADIUS[orbit.body] + altitude, density, 1.0 / scale_height, rotation]
+        if self.nrlmsis is not None:
+            air = [0.0] * cubics.SIZE
+        else:
+            altitude, density, scale_height = self._atmosphere(orbit)
+            air = [RADIUS[orbit.body] + altitude, density, 1.0 / scale_height]
         facets = [
             [0.5 * facet.drag_coefficient * facet.area, *facet.outward, *facet.position]
-            for facet in self.facets
+            for facet in self.facets or environment.facets
         ]
-        return np.concatenate([[place], orbit.elements(), air, *facets])
+        return np.concatenate([[place], orbit.elements(), air, [rotation], *facets])
 
     def _atmosphere(self, orbit: Any) -> tuple[float, float, float]:
         """Return an altitude [m], the density there [kg/m^3] and the scale height [m]."""

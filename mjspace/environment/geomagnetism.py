@@ -10,13 +10,12 @@ from datetime import datetime, timedelta
 import numpy as np
 from pyIGRF14.calculate import igrf12syn as synthesis  # of the 14th generation, by its data
 from pyIGRF14.loadCoeffs import get_coeffs
-from scipy.interpolate import CubicSpline
 
 from mjspace.contract import Array
-from mjspace.environment import dipole, kepler
-from mjspace.environment.magnetic_field import MagneticField, of_piece
+from mjspace.environment import cubics, dipole
+from mjspace.environment.magnetic_field import MagneticField
+from mjspace.environment.orbit import orbit_position
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.plant import Rates
 
 SPACING = 10.0
 """s at most between the field's samples, which are whole control periods apart."""
@@ -48,58 +47,35 @@ def dipole_of(epoch: datetime) -> Dipole:
     )
 
 
-@dataclass(frozen=True)
-class FieldAlongOrbit:
-    """The field [T], inertial axes, as one cubic after another."""
-
-    spacing: float
-    """How long each holds [s], from time zero on; a whole number of control periods."""
-    pieces: Array
-    """(n, 13): when each begins [s], then the factors (3) of the third power of the time since, of
-    the second, of the first, and of one."""
-
-    def piece(self, time: Array | float) -> Array:
-        """Return the cubic that holds from ``time`` [s] on, of shape (...), as (..., 13)."""
-        # time is a multiple of the control period, but for rounding
-        last = np.floor(np.asarray(time) / self.spacing + 1e-6).astype(int)
-        found: Array = self.pieces[np.clip(last, 0, len(self.pieces) - 1)]
-        return found
-
-    def at(self, time: Array | float) -> Array:
-        """Return the field [T], inertial axes, at ``time`` [s] of shape (...), as (..., 3)."""
-        return of_piece(self.piece(time), np.asarray(time))
-
-
-def along(environment: Environment, rates: Rates, duration: float) -> FieldAlongOrbit | None:
-    """Return the field along the environment's orbit for ``duration`` [s]; None where it has none.
+def along(environment: Environment, control: float, duration: float) -> cubics.Cubics:
+    """Return the field [T], inertial axes, along the environment's orbit for ``duration`` [s].
 
     A spline of samples: with one every 10 s of an orbit of 97 minutes over the poles it is within
     7e-14 T of the dipole's field and 2e-13 T of the reference field, 4e-9 of it; measured.
+    ``control`` is the control period [s].
 
     Raises:
         ValueError: the orbit meets the planet.
     """
     table, orbit = environment.magnetic_field, environment.orbit
-    if table is None or orbit is None:
-        return None
-    elements = orbit.elements()
-    spacing = rates.control * max(1.0, math.floor(SPACING / rates.control))
-    time: Array = spacing * np.arange(max(4.0, math.ceil(duration / spacing) + 2.0))
-    places = np.array([kepler.position(elements, instant) for instant in time])
-    spline = CubicSpline(time, field_at(table, places, time))
-    factors = np.moveaxis(spline.c, 0, 1).reshape(-1, 12)
-    return FieldAlongOrbit(spacing, np.column_stack([time[:-1], factors]))
+    epoch = table.time_zero(environment)
+    return cubics.through(
+        lambda time: field_at(table, epoch, orbit_position(orbit, time), time),
+        duration,
+        control,
+        SPACING,
+    )
 
 
-def field_at(table: MagneticField, place: Array, time: Array) -> Array:
+def field_at(table: MagneticField, epoch: datetime, place: Array, time: Array) -> Array:
     """Return the field [T] at each ``place`` [m] from the centre and ``time`` [s], (n, 3) and (n,).
 
     Places and field are in inertial axes. Dipole and reference field are those of the epoch, and do
     not age from it on: in a day they change by 1e-5 of themselves.
     """
-    turned = sidereal_angle(table.epoch)
+    turned = sidereal_angle(epoch)
     if table.model == "dipole":
-        earth = dipole_of(table.epoch)
+        earth = dipole_of(epoch)
         tilt = earth.tilt if table.tilt is None else table.tilt
         longitude = earth.longitude + turned
         rotation = dipole.EARTH_ROTATION
@@ -110,7 +86,7 @@ def field_at(table: MagneticField, place: Array, time: Array) -> Array:
     latitude = np.arcsin(place[:, 2] / radius)
     ascension = np.arctan2(place[:, 1], place[:, 0])
     longitudes = np.degrees(ascension - turned - dipole.EARTH_ROTATION * time) % 360.0
-    year = _year(table.epoch)
+    year = _year(epoch)
     where = zip(1e-3 * radius, np.degrees(latitude), longitudes, strict=True)
     # itype 2: geocentric; km, degrees, nT
     north, east, down, _ = np.array([synthesis(year, 2, *point) for point in where]).T

@@ -70,7 +70,7 @@ class CentralGravity(Term):
     radius: Annotated[Positive, Si("m")] | None = None
     """From the planet's centre to the origin; the body's when left out."""
 
-    def payload_size(self) -> int:
+    def payload_size(self, environment: Environment) -> int:
         """Return the size of ``parameters``."""
         return 2
 

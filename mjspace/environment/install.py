@@ -5,6 +5,7 @@ it, so that it must be written again afterwards.
 """
 
 import functools
+from collections.abc import Iterator
 from typing import Any
 
 import mujoco
@@ -44,17 +45,26 @@ def _callbacks() -> tuple[Any, Any]:
 
 def userdata_size(environment: Environment, plant: PlantTable | None = None) -> int:
     """Return the ``nuserdata`` that a model needs for ``userdata`` with the same arguments."""
-    return HEADER + sum(2 + term.payload_size() for term in terms_of(environment, plant))
+    return HEADER + sum(2 + term.payload_size(environment) for term in terms_of(environment, plant))
 
 
 def places_of(kind: type[Term], environment: Environment, plant: PlantTable) -> list[int]:
     """Return where in ``userdata`` the parameters of each term of that ``kind`` begin."""
-    found, place = [], HEADER
+    return [at for term, at in _places(environment, plant) if isinstance(term, kind)]
+
+
+def places_read(name: str, environment: Environment, plant: PlantTable) -> list[int]:
+    """Return where in ``userdata`` terms read what is written in flight under that ``name``."""
+    places = _places(environment, plant)
+    return [at + term.reads[name] for term, at in places if name in term.reads]
+
+
+def _places(environment: Environment, plant: PlantTable) -> Iterator[tuple[Term, int]]:
+    """Yield each term and where its parameters begin in ``userdata``."""
+    place = HEADER
     for term in terms_of(environment, plant):
-        if isinstance(term, kind):
-            found.append(place + 2)
-        place += 2 + term.payload_size()
-    return found
+        yield term, place + 2
+        place += 2 + term.payload_size(environment)
 
 
 def userdata(model: Any, environment: Environment, plant: PlantTable | None = None) -> Array:
@@ -83,11 +93,11 @@ def userdata(model: Any, environment: Environment, plant: PlantTable | None = No
 
 
 def _block(term: Term, model: Any, environment: Environment) -> Array:
-    payload = term.pack(model, environment)
-    if payload.shape != (term.payload_size(),):
+    payload, size = term.pack(model, environment), term.payload_size(environment)
+    if payload.shape != (size,):
         raise ValueError(
             f"{type(term).__name__}.pack returned an array of shape {payload.shape}, should be "
-            f"({term.payload_size()},), its payload_size"
+            f"({size},), its payload_size"
         )
     return np.concatenate([[term.block_kind(), payload.size], payload])
 

@@ -12,10 +12,10 @@ from mjspace.environment import kepler
 from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies, add_wrench
 from mjspace.environment.compiled import compiled
-from mjspace.environment.constants import GM, RADIUS
+from mjspace.environment.constants import GM, J2, RADIUS
 from mjspace.environment.gravity import gradient_torque
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Finite, Positive, Si, WithinTurn
+from mjspace.scenario.fields import Finite, Positive, Si, Switch, WithinTurn
 
 
 @compiled
@@ -50,6 +50,7 @@ class Orbit(Term):
     """A Kepler orbit: its gravity gradient acts on every body, in the free-fall frame."""
 
     kernels: ClassVar = {1: tidal}
+    reads: ClassVar = {"orbit": 0}
 
     body: Literal["earth", "moon"] = "earth"
     """What is orbited."""
@@ -66,6 +67,16 @@ class Orbit(Term):
     true_anomaly: WithinTurn = 0.0
     """At time zero."""
 
+    j2: Switch = False
+    """Whether the Earth's oblateness makes node, periapsis and mean anomaly drift, at their secular
+    rates; the elements are then mean ones, and hold for a control period each."""
+
+    @model_validator(mode="after")
+    def _of_the_earth(self) -> Self:
+        if self.j2 and self.body not in J2:
+            raise ValueError(f'j2: the rates are those of body = "earth", not of the {self.body}')
+        return self
+
     @model_validator(mode="after")
     def _above_the_planet(self) -> Self:
         lowest, radius = self.semi_major_axis * (1.0 - self.eccentricity), RADIUS[self.body]
@@ -78,7 +89,7 @@ class Orbit(Term):
             )
         return self
 
-    def payload_size(self) -> int:
+    def payload_size(self, environment: Environment) -> int:
         """Return the size of ``elements``."""
         return 10
 
@@ -87,7 +98,30 @@ class Orbit(Term):
         return self.elements()
 
     def elements(self) -> Array:
-        """Return what ``kepler.position`` and ``kepler.velocity`` read, ten numbers.
+        """Return the elements at time zero: ``rows`` of it."""
+        row: Array = self.rows(np.zeros(1))[0]
+        return row
+
+    def drifts(self) -> tuple[float, float, float]:
+        """Return the secular rates of node, periapsis and mean anomaly, less the Kepler orbit's.
+
+        [rad/s]; to first order in J2 (Vallado 2013, Fundamentals of Astrodynamics and Applications,
+        4th edition, section 9.6.1). Zero without ``j2``.
+        """
+        if not self.j2:
+            return 0.0, 0.0, 0.0
+        a, shrink = self.semi_major_axis, 1.0 - self.eccentricity**2
+        rate = math.sqrt(GM[self.body] / a**3)
+        scale = 0.75 * rate * J2[self.body] * (RADIUS[self.body] / (a * shrink)) ** 2
+        sine2 = math.sin(self.inclination) ** 2
+        return (
+            -2.0 * scale * math.cos(self.inclination),
+            scale * (4.0 - 5.0 * sine2),
+            scale * math.sqrt(shrink) * (2.0 - 3.0 * sine2),
+        )
+
+    def rows(self, time: Array) -> Array:
+        """Return what ``kepler.position`` and ``kepler.velocity`` read at ``time`` [s], (n, 10).
 
         GM [m^3/s^2], mean motion [rad/s], mean anomaly at time zero [rad], eccentricity, then the
         two semi-axes as vectors [m], towards the periapsis and along the motion there.
@@ -99,14 +133,25 @@ class Orbit(Term):
             math.sqrt(1.0 + e) * math.cos(0.5 * self.true_anomaly),
         )
         mean_anomaly = 2.0 * half - e * math.sin(2.0 * half)
-        # columns: towards the ascending node and 90 deg ahead of it in the orbit
-        node, tilt = self.ascending_node, self.inclination
-        ahead = [-math.sin(node) * math.cos(tilt), math.cos(node) * math.cos(tilt), math.sin(tilt)]
-        plane = np.column_stack([[math.cos(node), math.sin(node), 0.0], ahead])
-        cosine, sine = math.cos(self.periapsis), math.sin(self.periapsis)
-        major = a * plane @ [cosine, sine]
-        minor = a * math.sqrt(1.0 - e * e) * plane @ [-sine, cosine]
-        return np.array([gm, math.sqrt(gm / a**3), mean_anomaly, e, *major, *minor])
+        node_rate, periapsis_rate, anomaly_rate = self.drifts()
+        scalars = [gm, math.sqrt(gm / a**3) + anomaly_rate, mean_anomaly, e]
+        rows = []
+        for instant in time:
+            node = self.ascending_node + node_rate * instant
+            periapsis = self.periapsis + periapsis_rate * instant
+            rows.append([*scalars, *_semi_axes(a, e, self.inclination, node, periapsis)])
+        return np.array(rows)
+
+
+def _semi_axes(a: float, e: float, tilt: float, node: float, periapsis: float) -> list[float]:
+    """Return the two semi-axes [m] of an ellipse as vectors, towards the periapsis and ahead."""
+    # columns: towards the ascending node and 90 deg ahead of it in the orbit
+    ahead = [-math.sin(node) * math.cos(tilt), math.cos(node) * math.cos(tilt), math.sin(tilt)]
+    plane = np.column_stack([[math.cos(node), math.sin(node), 0.0], ahead])
+    cosine, sine = math.cos(periapsis), math.sin(periapsis)
+    major = a * plane @ [cosine, sine]
+    minor = a * math.sqrt(1.0 - e * e) * plane @ [-sine, cosine]
+    return [*major, *minor]
 
 
 def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
@@ -115,6 +160,7 @@ def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
     ``time`` [s] of shape (...) gives positions of shape (..., 3).
     """
     times = np.asarray(time, dtype=np.float64)
-    elements = orbit.elements()
-    positions = [kepler.position(elements, instant) for instant in times.ravel()]
+    instants = times.ravel()
+    rows = orbit.rows(instants) if orbit.j2 else np.tile(orbit.elements(), (times.size, 1))
+    positions = [kepler.position(row, instant) for row, instant in zip(rows, instants, strict=True)]
     return np.reshape(positions, (*times.shape, 3))

@@ -51,7 +51,7 @@ class TorqueRipple(Term):
         """Return the plant's ripple; nothing where there is none."""
         return [cls(ripples=plant.ripple)] if plant.ripple else []
 
-    def payload_size(self) -> int:
+    def payload_size(self, environment: Environment) -> int:
         """Return five numbers for each hinge."""
         return 5 * len(self.ripples)
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from types import GenericAlias
 from typing import Annotated, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     GetCoreSchemaHandler,
@@ -125,6 +127,16 @@ def _file_name(name: str) -> str:
     return name
 
 
+def _written_out(epoch: Any) -> Any:
+    if isinstance(epoch, int | float) or (isinstance(epoch, str) and "-" not in epoch):
+        raise ValueError(f"got {epoch!r}, should be a date as in 2025-01-01T12:00:00")
+    return epoch
+
+
+def _universal(epoch: datetime) -> datetime:
+    return epoch.astimezone(UTC).replace(tzinfo=None) if epoch.tzinfo else epoch
+
+
 def _marked(name: Any, inner: ValidatorFunctionWrapHandler) -> Any:
     return name if isinstance(name, CommandLineText) else inner(name)
 
@@ -141,6 +153,8 @@ Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, strict=True, allow_inf_nan=False)]
 Switch = Annotated[bool, Field(strict=True)]
+Epoch = Annotated[datetime, BeforeValidator(_written_out), AfterValidator(_universal)]
+"""A date and time, UTC where it says no other, kept without a time zone."""
 Count = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 SensorName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]

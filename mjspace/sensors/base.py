@@ -41,6 +41,8 @@ class Surroundings:
     """What accelerometers do not measure [m/s^2], (..., 3), at each position [m], (..., 3)."""
     magnetic_field: Callable[[Array], Array] | None = None
     """Of the Earth, inertial axes [T], (..., 3), at each time [s], (...)."""
+    sun_position: Callable[[Array], Array] | None = None
+    """Of the Sun from the Earth's centre, inertial axes [m], (..., 3), at each time [s], (...)."""
     orbit_position: Callable[[Array], Array] | None = None
     """Of the frame's origin from the planet's centre, inertial axes [m], (..., 3), at each time."""
 

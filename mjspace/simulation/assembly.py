@@ -1,10 +1,10 @@
 """From a scenario to everything that flies: vehicle, environment, sensors, actuators, law."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,12 +22,10 @@ from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
+from mjspace.simulation.known_beforehand import Known, known_of, seen_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
 from mjspace.vehicle.vehicle import Vehicle, build, driven_by, initial_state
-
-if TYPE_CHECKING:
-    from mjspace.environment.geomagnetism import FieldAlongOrbit
 
 METHODS = {
     "law": ("reset(measurement, reference)", "step(state, time, measurement, reference)"),
@@ -51,8 +49,9 @@ class Assembly:
     """At time zero, (nv,)."""
     userdata: Array
     """The environment's parameters, one row (nuserdata,)."""
-    field: "FieldAlongOrbit | None"
-    """The Earth's magnetic field where the vehicle goes; None where there is none."""
+    known: Mapping[str, Known]
+    """What is known of the environment as a function of time: the magnetic field, the Sun's
+    position, the air's density, a drifting orbit's elements."""
     actuators: ActuatorSet
     reference: ReferenceSource
     law: Law
@@ -86,8 +85,8 @@ class Assembly:
             }
             | {f"{n}_closed": OwnSensor(1, "", False) for n in self.scenario.plant.connections},
             gravity=self._gravity,
-            magnetic_field=None if self.field is None else self.field.at,
             orbit_position=None if orbit is None else partial(orbit_position, orbit),
+            **{name: one.at for name, one in seen_of(self.known).items()},
         )
 
     @property
@@ -190,7 +189,7 @@ def assemble(
             scenario.environment,
             scenario.plant,
         ),
-        field=_part("environment", _magnetic_field, scenario),
+        known=_part("environment", known_of, scenario),
         actuators=_part("plant", _actuators, vehicle, scenario, inner=inner),
         reference=reference,
         law=law if getattr(law, "batched", False) else UnbatchedLaw(law),
@@ -294,15 +293,6 @@ def _actuators(vehicle: Vehicle, scenario: Scenario, *, inner: bool) -> Actuator
             )
             kinds += (table.actuator(context),)
     return ActuatorSet(kinds)
-
-
-def _magnetic_field(scenario: Scenario) -> "FieldAlongOrbit | None":
-    """Return the Earth's magnetic field where the vehicle goes; None where it has none."""
-    if scenario.environment.magnetic_field is None:
-        return None
-    from mjspace.environment.geomagnetism import along  # with SciPy's splines, which take 0.2 s
-
-    return along(scenario.environment, scenario.rates, scenario.duration)
 
 
 def _gravity_at_start(scenario: Scenario) -> float:

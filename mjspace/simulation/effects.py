@@ -6,7 +6,7 @@ from mjspace.simulation.actuator_faults import ActuatorFaults
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.burning_mass import BurningMass
 from mjspace.simulation.connections import Connections
-from mjspace.simulation.magnetic_field import MagneticField
+from mjspace.simulation.known_beforehand import KnownBeforehand
 from mjspace.simulation.model_sensors import ModelSensors, depend_on_masses
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_disturbance import UserDisturbance
@@ -29,7 +29,7 @@ def effects_of(
         ModelSensors.of(model, sensors, gravity, burns=burning is not None),
         Connections.of(assembly),
         ActuatorFaults.of(assembly, members),
-        MagneticField.of(assembly.field),
+        KnownBeforehand.of(assembly.known, scenario),
         UserDisturbance.of(assembly, layout),
         LoggedParts.of(model, reports(scenario.plant.moving_parts)),
         deployments.of(model, assembly.qpos, scenario.plant.parts, scenario.rates.physics),

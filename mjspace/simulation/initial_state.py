@@ -11,11 +11,12 @@ import numpy as np
 from mjspace.contract import Array
 from mjspace.environment.connection import Latch
 from mjspace.environment.install import install_callbacks, places_of
-from mjspace.environment.magnetic_field import FIELD, MOMENT
+from mjspace.environment.magnetic_field import MOMENT
 from mjspace.errors import InputError
 from mjspace.scenario.scenario import Scenario
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.effects import effects_of
+from mjspace.simulation.known_beforehand import changing
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.truth import truth_of
 
@@ -64,8 +65,8 @@ def state_of_log(assembly: Assembly, physics: Array) -> Array:
     """Return a logged integration state, (1, nstate), with the constants of the ``assembly`` in it.
 
     ``userdata`` tells the native callbacks which memory to read and write. Of a log, which may be a
-    stranger's, only what changes in flight is taken: the magnetic field, the moment, and the states
-    of connections.
+    stranger's, only what changes in flight is taken: the magnetic field, the Sun's position, the
+    air's density, the elements of a drifting orbit, the moment, and the states of connections.
 
     Raises:
         InputError: a number of it is not finite.
@@ -77,9 +78,11 @@ def state_of_log(assembly: Assembly, physics: Array) -> Array:
     data = mujoco.MjData(model)
     mujoco.mj_setState(model, data, physics[0], INTEGRATION)
     constants = assembly.userdata.copy()
-    if assembly.field is not None:
-        for changes in (FIELD, MOMENT):
-            constants[changes] = data.userdata[changes]
+    changes = changing(assembly.known, assembly.scenario)
+    if assembly.scenario.environment.magnetic_field is not None:
+        changes.append(MOMENT)
+    for part in changes:
+        constants[part] = data.userdata[part]
     states = places_of(Latch, assembly.scenario.environment, assembly.scenario.plant)
     constants[states] = data.userdata[states]
     data.userdata = constants

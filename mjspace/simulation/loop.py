@@ -26,6 +26,7 @@ from mjspace.simulation.recording import (
     until_trouble,
 )
 from mjspace.simulation.stepper import Stepper
+from mjspace.simulation.sunlight import ECLIPSES
 from mjspace.simulation.user_code import reference_at
 
 BLOCK_PERIODS = 2000
@@ -56,6 +57,8 @@ def fly(
     last = last_period(assembly.scenario)
     saturated = np.zeros((len(members), len(assembly.vehicle.motors)), dtype=bool)
     declared = assembly.scenario.events
+    if "sun_position" in assembly.known:
+        declared = [*declared, *ECLIPSES]
     inside = np.zeros((len(members), len(declared)), dtype=bool)
     period = start.period
     layout, effects = flight.stepper.layout, flight.stepper.effects

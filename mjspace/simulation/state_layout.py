@@ -12,6 +12,7 @@ from mjspace.sensors.base import Motion
 from mjspace.sensors.magnetometer import Magnetometer
 from mjspace.sensors.velocimeter import Velocimeter
 from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.sunlight import Sunlight, sunlight_at
 
 _TRANSLATION = ("position", "velocity", "altitude")
 """Quantities that the truth has wherever a sensor measures the bus's translation."""
@@ -47,8 +48,7 @@ class StateLayout:
             for quantity, sensor in kinds.items()
             if quantity not in (*ALWAYS, "model") and not sensor.integrates
         }
-        orbit = assembly.scenario.environment.orbit
-        self.orbit = None if orbit is None else orbit.elements()
+        self.environment = assembly.scenario.environment
 
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors report, as views of the state rows where that is possible.
@@ -76,12 +76,20 @@ class StateLayout:
             "ground_velocity": _VELOCIMETER.true_value(motion),
             "magnetic_field": _MAGNETOMETER.true_value(motion),
         }
-        vehicles, time = len(physics), float(physics[0, 0])
-        place = np.empty(0) if self.orbit is None else kepler.position(self.orbit, time)
-        speed = np.empty(0) if self.orbit is None else kepler.velocity(self.orbit, time)
+        vehicles, time, orbit = len(physics), float(physics[0, 0]), self.environment.orbit
+        elements = None if orbit is None else orbit.rows(np.array([time]))[0]
+        place = np.empty(0) if elements is None else kepler.position(elements, time)
+        speed = np.empty(0) if elements is None else kepler.velocity(elements, time)
         known["orbit_position"] = np.tile(place, (vehicles, 1))
         known["orbit_velocity"] = np.tile(speed, (vehicles, 1))
+        none = np.empty((vehicles, 0))
+        known |= (sunlight_at(motion, self.environment) or Sunlight(none, none))._asdict()
         return Truth(**{name: known[name] for name in Truth._fields})
+
+    def sunlight(self, physics: Array) -> dict[str, Array]:
+        """Return what is seen of the Sun at ``physics``; nothing where that is not known."""
+        found = sunlight_at(self.moving_bus(physics), self.environment)
+        return {} if found is None else found._asdict()
 
     def moving_bus(self, physics: Array) -> Motion:
         """Return the bus's motion, as views of the state rows."""

@@ -118,8 +118,9 @@ def test_magnetometer_shows_the_field_in_body_axes() -> None:
     built = assemble(*load("b-dot-igrf", ["duration=200", "sensors.magnetic_field.noise_std=0"]))
     (block,) = fly(built, first_start(built, [0]))
     seen, truth = block.rows["/measurement"]["magnetic_field"][:, 0], block.rows["/truth"]
-    assert built.field is not None
-    field = attitude.rotate(attitude.conjugate(truth["attitude"][:, 0]), built.field.at(block.time))
+    known = built.surroundings.magnetic_field
+    assert known is not None
+    field = attitude.rotate(attitude.conjugate(truth["attitude"][:, 0]), known(block.time))
     np.testing.assert_allclose(seen, field, atol=1e-18)
     moment, outside = block.rows["/command"]["magnetic_moment"], block.rows["/disturbance"]
     # What the environment does to the bus is this and the gravity gradient, below 3 n^2 9 kg m^2.

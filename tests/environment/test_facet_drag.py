@@ -12,7 +12,8 @@ from mjspace.contract import Array
 from mjspace.environment import kepler
 from mjspace.environment.constants import RADIUS
 from mjspace.environment.dipole import EARTH_ROTATION
-from mjspace.environment.facet_drag import ATMOSPHERE, Facet, FacetDrag
+from mjspace.environment.facet_drag import ATMOSPHERE, FacetDrag
+from mjspace.environment.facets import Facet
 from mjspace.environment.install import install_callbacks, userdata, userdata_size
 from mjspace.environment.orbit import Orbit
 from mjspace.scenario.environment import Environment

@@ -13,12 +13,11 @@ from mjspace.environment.geomagnetism import along, field_at, sidereal_angle
 from mjspace.environment.magnetic_field import MagneticField
 from mjspace.environment.orbit import Orbit
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.plant import Rates
 
 POLAR = Orbit(semi_major_axis=6.978e6, inclination=0.5 * np.pi)
-RATES = Rates(physics=1.0, control=2.0)
+CONTROL = 2.0
 NEW_YEAR = datetime(2025, 1, 1)
-IGRF = MagneticField(model="igrf", epoch=NEW_YEAR)
+IGRF = MagneticField(model="igrf")
 
 
 def inertial(colatitude: float, longitude: float, turned: float) -> tuple[Array, Array]:
@@ -43,7 +42,7 @@ def test_reference_field(
     time = 4000.0
     turned = sidereal_angle(NEW_YEAR) + dipole.EARTH_ROTATION * time
     axes, up = inertial(colatitude, longitude, turned)
-    field = field_at(IGRF, 1e3 * radius * up[None], np.array([time]))[0]
+    field = field_at(IGRF, NEW_YEAR, 1e3 * radius * up[None], np.array([time]))[0]
     # the same coefficients: rounding
     np.testing.assert_allclose(1e9 * axes @ field, nanotesla, atol=1e-6)
 
@@ -65,33 +64,27 @@ def test_dipole_is_the_reference_of_its_epoch_from_afar(epoch: datetime) -> None
     rng = np.random.default_rng(1)
     up = attitude.normalize(rng.normal(size=(20, 3)))
     time = 1e5 * rng.uniform(size=20)
-    tilted = MagneticField(epoch=epoch)
-    real = MagneticField(model="igrf", epoch=epoch)
+    tilted, real = MagneticField(), MagneticField(model="igrf")
     far = 6.4e9  # m: of the other degrees, 20 % at the surface, 1/1000 is left
-    one, other = (field_at(table, far * up, time) for table in (tilted, real))
+    one, other = (field_at(table, epoch, far * up, time) for table in (tilted, real))
     assert np.abs(one - other).max() < 3e-4 * np.abs(one).max()
-    upright = field_at(MagneticField(tilt=0.0), 7e6 * np.eye(3)[:1], np.zeros(1))
+    upright = field_at(MagneticField(tilt=0.0), NEW_YEAR, 7e6 * np.eye(3)[:1], np.zeros(1))
     np.testing.assert_allclose(upright[0, :2], 0.0, atol=1e-20)
     assert upright[0, 2] > 2e-5
 
 
 @pytest.mark.parametrize(("model", "bound"), [("dipole", 2e-13), ("igrf", 5e-13)])
 def test_between_samples(model: str, bound: float) -> None:
-    table = MagneticField(model=model, epoch=NEW_YEAR)
-    found = along(Environment(orbit=POLAR, magnetic_field=table), RATES, 3000.0)
-    assert found is not None
+    table = MagneticField(model=model)
+    found = along(Environment(orbit=POLAR, magnetic_field=table), CONTROL, 3000.0)
     assert found.spacing == 10.0
     time = np.append(np.random.default_rng(2).uniform(0.0, 3000.0, 60), 3000.0)
     places = np.array([kepler.position(POLAR.elements(), t) for t in time])
     # of 4.5e-5 T: measured 7e-14 and 1.6e-13
-    assert np.abs(found.at(time) - field_at(table, places, time)).max() < bound
+    assert np.abs(found.at(time) - field_at(table, NEW_YEAR, places, time)).max() < bound
     # every period lies within one cubic, whatever rounding did to its beginning
-    begins = RATES.control * np.arange(1500)
-    assert np.all(found.piece(begins * (1.0 - 1e-15))[:, 0] == 10.0 * (begins // 10.0))
-
-
-def test_no_field_where_none_is_asked_for() -> None:
-    assert along(Environment(orbit=POLAR), RATES, 10.0) is None
+    begins = CONTROL * np.arange(1500)
+    assert np.all(found.rows(begins * (1.0 - 1e-15))[:, 0] == 10.0 * (begins // 10.0))
 
 
 def test_what_is_refused() -> None:
