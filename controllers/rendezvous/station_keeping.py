@@ -10,7 +10,7 @@ import numpy as np
 
 from mjspace.algebra import dot, times
 from mjspace.attitude import conjugate, rotate
-from mjspace.contract import Array, Measurement, PulseCommand, Trajectory, Unit, gain
+from mjspace.contract import Array, Measurement, PulseCommand, Reference, Trajectory, Unit, gain
 
 from ..attitude.turn import turn
 from ..thrusters.pulsed_pd import PulsedPd
@@ -63,8 +63,9 @@ class StationKeeping(PulsedPd):
         self, state: State, time: float, measurement: Measurement, reference: Trajectory
     ) -> tuple[State, PulseCommand, Signals]:
         """Return the next state, the on-times of this period, and the signals."""
-        angle, slip = turn(measurement, reference, np.eye(3))
-        torque = self._torque(angle, slip, measurement.rate, reference)
+        turning = Reference(reference.attitude, reference.rate, reference.acceleration)
+        angle, slip = turn(measurement, turning, np.eye(3))
+        torque = self._torque(angle, slip, measurement.rate, turning)
         error = measurement.position - reference.position
         force = rotate(conjugate(measurement.attitude), self._force(measurement, error, reference))
         _, on_time, carry = self._pulses(state.carry, torque, force)

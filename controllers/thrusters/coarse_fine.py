@@ -7,6 +7,7 @@ may have leading vehicle axes.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -58,8 +59,8 @@ class CoarseFine(PhasePlane):
     def _small(self) -> Array:
         return self._patterns_of(self.thruster_force < self.fine_below)
 
-    def _patterns_of(self, fitted: Array) -> Array:
-        """The shares of the ``fitted`` thrusters along each axis, and against it, (2, m, n)."""
+    def _patterns_of(self, fitted: Any) -> Array:
+        """Return the ``fitted`` thrusters' shares along each axis, and against it, (2, m, n)."""
         effects = self._effects * fitted
         ways = ([pattern(way * axis, effects) for axis in self.axes] for way in (1.0, -1.0))
         return np.array(list(ways))
