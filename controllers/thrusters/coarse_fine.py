@@ -7,13 +7,11 @@ may have leading vehicle axes.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from mjspace.contract import Array, gain
 
-from .allocation import pattern
 from .relays import PhasePlane
 
 
@@ -53,25 +51,16 @@ class CoarseFine(PhasePlane):
 
     @cached_property
     def _patterns(self) -> Array:
-        return self._patterns_of(self.thruster_force >= self.fine_below)
+        return self._patterns_of(self._effects * (self.thruster_force >= self.fine_below))
 
     @cached_property
     def _small(self) -> Array:
-        return self._patterns_of(self.thruster_force < self.fine_below)
-
-    def _patterns_of(self, fitted: Any) -> Array:
-        """Return the ``fitted`` thrusters' shares along each axis, and against it, (2, m, n)."""
-        effects = self._effects * fitted
-        ways = ([pattern(way * axis, effects) for axis in self.axes] for way in (1.0, -1.0))
-        return np.array(list(ways))
+        return self._patterns_of(self._effects * (self.thruster_force < self.fine_below))
 
     @cached_property
     def fine_acceleration(self) -> Array:
         """u of each axis [rad/s^2], (m,)."""
-        torques = self._effects[:3] @ self._small[0].T
-        moments = np.einsum("mi,ij,mj->m", self.axes, self.inertia, self.axes)
-        found: Array = np.einsum("mi,im->m", self.axes, torques) / moments
-        return found
+        return self._acceleration_by(self._small[0])
 
     def _decide(self, memory: Array, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
         stops_at = np.abs(angle) + rate**2 / (2.0 * self.fine_acceleration)
