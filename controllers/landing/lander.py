@@ -121,8 +121,7 @@ class VariableStructure(GimballedEngine):
 
         virtual = self._turned(times(self._feedback, Z), c, s)
         S = self.loop_share * (self.surface_gain * X2 + virtual)  # (33)
-        robust = self.robust_gain * np.tanh(self.robust_gain * S / self.smoothing)  # (36)
-        U = -S - robust  # (34)
+        U = -S - self._robust(S)  # (34)
         upright = np.cos(phi) * np.cos(gamma)
         thrust = self._thrust(U[..., :1], upright, desired, at.propellant)
         commanded = np.concatenate([thrust, U[..., 1:]], axis=-1)
@@ -130,6 +129,11 @@ class VariableStructure(GimballedEngine):
         cut = touched(state.cut, measurement)
         signals = Signals(error, Z, S, commanded[..., :1], commanded[..., :0:-1])
         return State(cut), burning(cut, self.limited(commanded)), signals
+
+    def _robust(self, S: Array) -> Array:
+        """Return psi, (36), (..., 3)."""
+        robust: Array = self.robust_gain * np.tanh(self.robust_gain * S / self.smoothing)
+        return robust
 
     def _cylindrical(self, position: Array, velocity: Array, theta_d: Array) -> tuple[Array, ...]:
         """Return r, r', theta - theta_d and theta' as K expects them, and theta, each (..., 1).

@@ -98,19 +98,8 @@ class ThrustVectoring(GimballedEngine):
         self, state: State, time: float, measurement: Measurement, reference: Trajectory
     ) -> tuple[State, ThrustCommand, Signals]:
         """Return the next state, the thrust and gimbal angles, and the errors."""
-        at, desired, w = measurement, reference, measurement.rate
-        error = at.position - desired.position
-        to_body = conjugate(at.attitude)
-        f = rotate(to_body, self._desired_force(at, desired, state.integral))
-        pointing = cross(_THRUST_AXIS, f) / np.sqrt(dot(f, f))
-
-        from_desired = multiply(to_body, desired.attitude)
-        turn = _shortened(self.pointing_gain * pointing, self.turn_limit)
-        rate = rotate(from_desired, desired.rate) + turn
-        spin = rotate(from_desired, desired.acceleration) + self.rate_gain * (rate - w)
-        torque = times(self.inertia, spin) + cross(w, times(self.inertia, w))
-
-        thrust = self.mass * f[..., 2:]
+        error = measurement.position - reference.position
+        pointing, thrust, torque = self._wanted(state.integral, measurement, reference)
         # The torque is lever F (sin b1, -cos b1 sin b2, 0).
         lever = self.lever * np.clip(thrust, *self.thrust_range)
         b1 = np.arcsin(np.clip(torque[..., :1] / lever, -1.0, 1.0))
@@ -122,6 +111,22 @@ class ThrustVectoring(GimballedEngine):
         after = State(cut, state.integral + self.control_period * integrated)
         signals = Signals(error, pointing[..., :2], commanded[..., :1], commanded[..., :0:-1])
         return after, burning(cut, self.limited(commanded)), signals
+
+    def _wanted(
+        self, integral: Array, measurement: Measurement, reference: Trajectory
+    ) -> tuple[Array, Array, Array]:
+        """Return the pointing error, the thrust [N] and the torque [N m], body axes."""
+        at, desired, w = measurement, reference, measurement.rate
+        to_body = conjugate(at.attitude)
+        f = rotate(to_body, self._desired_force(at, desired, integral))
+        pointing = cross(_THRUST_AXIS, f) / np.sqrt(dot(f, f))
+
+        from_desired = multiply(to_body, desired.attitude)
+        turn = _shortened(self.pointing_gain * pointing, self.turn_limit)
+        rate = rotate(from_desired, desired.rate) + turn
+        spin = rotate(from_desired, desired.acceleration) + self.rate_gain * (rate - w)
+        torque = times(self.inertia, spin) + cross(w, times(self.inertia, w))
+        return pointing, self.mass * f[..., 2:], torque
 
     def _desired_force(
         self, measurement: Measurement, reference: Trajectory, integral: Array

@@ -76,10 +76,15 @@ class PulsedPd(Gains):
         """Return the next state, the on-times of this period, and the signals."""
         angle, slip = turn(measurement, reference, np.eye(3))
         torque = self._torque(angle, slip, measurement.rate, reference)
-        desired = np.concatenate([torque, np.zeros_like(torque)], axis=-1)
-        shares, _ = within(share(desired, self._effects))
-        on_time, carry = pulses(shares, state.carry, self.control_period, self.thruster_minimum_on)
+        shares, on_time, carry = self._pulses(state.carry, torque, np.zeros_like(torque))
         return State(carry), PulseCommand(on_time), Signals(angle, slip, torque, shares)
+
+    def _pulses(self, carry: Array, torque: Array, force: Array) -> tuple[Array, Array, Array]:
+        """Return shares, on-times and what is carried over [s], (..., n), body axes [N m, N]."""
+        desired = np.concatenate([torque, self.force_weight * force], axis=-1)
+        shares, _ = within(share(desired, self._effects))
+        period, shortest = self.control_period, self.thruster_minimum_on
+        return shares, *pulses(shares, carry, period, shortest)
 
     def _torque(self, angle: Array, slip: Array, rate: Array, reference: Reference) -> Array:
         half = 0.5 * np.linalg.norm(angle, axis=-1, keepdims=True)

@@ -82,10 +82,7 @@ class PhasePlane(Gains, ABC):
     @cached_property
     def acceleration(self) -> Array:
         """U of each axis [rad/s^2], (m,)."""
-        torques = self._effects[:3] @ self._patterns[0].T
-        moments = np.einsum("mi,ij,mj->m", self.axes, self.inertia, self.axes)
-        found: Array = np.einsum("mi,im->m", self.axes, torques) / moments
-        return found
+        return self._acceleration_by(self._patterns[0])
 
     @cached_property
     def _effects(self) -> Array:
@@ -94,8 +91,19 @@ class PhasePlane(Gains, ABC):
     @cached_property
     def _patterns(self) -> Array:
         """The thrusters' shares for a torque along each axis, and against it, (2, m, n)."""
-        ways = ([pattern(way * axis, self._effects) for axis in self.axes] for way in (1.0, -1.0))
+        return self._patterns_of(self._effects)
+
+    def _patterns_of(self, effects: Array) -> Array:
+        """Return such shares of thrusters with these ``effects`` (6, n)."""
+        ways = ([pattern(way * axis, effects) for axis in self.axes] for way in (1.0, -1.0))
         return np.array(list(ways))
+
+    def _acceleration_by(self, patterns: Array) -> Array:
+        """Return the angular acceleration about each axis by its ``patterns`` (m, n), (m,)."""
+        torques = self._effects[:3] @ patterns.T
+        moments = np.einsum("mi,ij,mj->m", self.axes, self.inertia, self.axes)
+        found: Array = np.einsum("mi,im->m", self.axes, torques) / moments
+        return found
 
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the initial memory."""
