@@ -72,6 +72,9 @@ class SpeedBench(Gains):
     """k_a; zero: psi^2 stays at ``ratio``."""
     ratio: float = gain(default=0.0, at_least=0.0)
     """Initial psi^2."""
+    clock: float = gain("rad/s", default=0.0, at_least=0.0)
+    """Of a vibration that depends on time: psi is its frequency over this rate, and at most 1.22.
+    Zero: it depends on the rotor's angle."""
     current_gain: float = gain("1/s", default=3000.0, above=0.0)
     """k_ep; k_ei is k_ep R/L."""
     voltage_limit: float = gain("V", default=inf, above=0.0, at_most=inf)
@@ -119,6 +122,7 @@ class SpeedBench(Gains):
             adaptation_gain=self.adaptation_gain,
             lead=1.0 / self.current_gain,
             ratio=self.ratio,
+            clock=self.clock,
             current_limit=self.current_limit,
         )
 

@@ -32,12 +32,13 @@ def test_kinds_of_blocks_are_those_of_logs() -> None:
         8: "friction",
         9: "drag",
         10: "connect",
+        11: "vibrate",
     }
 
 
 def test_two_terms_of_one_kind_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TorqueRipple, "kernels", {6: None})
-    message = "CentralGravity and TorqueRipple both have blocks of kind 6: 11 is free"
+    message = "CentralGravity and TorqueRipple both have blocks of kind 6: 12 is free"
     with pytest.raises(ValueError, match=message):
         terms.kernels()
 
