@@ -90,9 +90,9 @@ class InternalModel(Gains):
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return no disturbance, and a torque under which the rate was constant until now."""
         w = measurement.rate
-        none = 0.0 * w
+        z1, z2, bias = (np.zeros_like(w) for _ in range(3))
         phi = np.full_like(w, self.frequency**2)
-        return State(w, none, none, none, phi, w, cross(w, times(self.inertia, w)))
+        return State(w.copy(), z1, z2, bias, phi, w.copy(), cross(w, times(self.inertia, w)))
 
     def step(
         self, state: State, time: float, measurement: Measurement, reference: Reference
@@ -107,13 +107,12 @@ class InternalModel(Gains):
         angle = 0.5 * self.control_period * psi  # the torque is held for a period
         ahead = np.cos(angle) * z1 + np.sin(angle) * psi * z2
         torque = without - ahead - bias
-        after = State(rate_hat, z1, z2, bias, phi, w, torque)
+        after = State(rate_hat, z1, z2, bias, phi, w.copy(), torque)
         return after, TorqueCommand(torque), Signals(sigma_e, s, z1 + bias, psi)
 
     def _observed(self, state: State, w: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return rate_hat, z1_hat, z2_hat, bias_hat and phi_hat a period later, each (..., 3)."""
-        T = self.control_period
-        M = self.inertia
+        T, M = self.control_period, self.inertia
         mean = 0.5 * (w + state.rate)
         drive = state.torque - cross(mean, times(M, mean))
         slip = state.rate_hat - state.rate
@@ -129,12 +128,11 @@ class InternalModel(Gains):
         residual = T * (mean_z + drive) - times(M, w - state.rate)
         mean_z2 = 0.5 * (z2 + state.z2_hat)
         phi = state.phi_hat - self.adaptation_gain * mean_z2 * residual
-        within: Array = np.clip(phi, 0.0, self.largest_frequency**2)
-        return rate_hat, z1, z2, bias, within
+        return rate_hat, z1, z2, bias, np.clip(phi, 0.0, self.largest_frequency**2)
 
     @cached_property
     def _inverse(self) -> Array:
-        return np.linalg.inv(self.inertia)
+        return np.asarray(np.linalg.inv(self.inertia))
 
     @cached_property
     def _gains(self) -> Array:

@@ -49,8 +49,10 @@ class _Bench(Gains):
     control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
     amplitude: float = gain("rad/s", default=20.0)
-    """Of the desired speed, amplitude sin(frequency t)."""
+    """Of the desired speed, mean_speed + amplitude sin(frequency t)."""
     frequency: float = gain("rad/s", default=0.5 * pi)
+    """Of the desired speed."""
+    mean_speed: float = gain("rad/s", default=0.0)
     """Of the desired speed."""
     rotor_inertia: float = gain("kg m^2", default=0.016, above=0.0)
     """J."""
@@ -96,7 +98,8 @@ class _Bench(Gains):
     ) -> tuple[BenchState, VoltageCommand, BenchSignals]:
         """Return the next state, the voltage and the estimates; the reference is not used."""
         speed, current = measurement.wheel_speed, measurement.current
-        desired = np.full_like(speed, self.amplitude * np.sin(self.frequency * time))
+        swing = self.amplitude * np.sin(self.frequency * time)
+        desired = np.full_like(speed, self.mean_speed + swing)
         ahead = self.frequency * (time + self._lag)
         slope = np.full_like(speed, self.amplitude * self.frequency * np.cos(ahead))
         memory, commanded = self._speed_loop.step(

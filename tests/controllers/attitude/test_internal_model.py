@@ -85,8 +85,9 @@ def test_a_bias_is_learned_beside_it() -> None:
     )
     bias = np.array([0.01, -0.02, 0.03])
     state, _ = flown(law, 16.0, lambda _: bias)[-1]
-    np.testing.assert_allclose(state.bias_hat, bias, atol=2e-3)
-    np.testing.assert_allclose(state.z1_hat + state.bias_hat, bias, atol=1e-3)
+    # A tenth of the largest is left, of the slowest pole.
+    np.testing.assert_allclose(state.bias_hat, bias, atol=3e-3)
+    np.testing.assert_allclose(state.z1_hat + state.bias_hat, bias, atol=3e-3)
 
 
 def test_unfit_gains_are_refused() -> None:
