@@ -44,9 +44,9 @@ def differences(model: Model, flown: dict[str, Array]) -> tuple[float, float]:
 
 def test_the_full_model_is_the_plant(flown: dict[str, Array]) -> None:
     angle, rate = differences(full, flown)
-    # Of samples 1 ms apart while the gimbals start within a few.
-    assert angle < 2e-5
-    assert rate < 2e-5
+    # 3e-8 and 2e-9 measured: RK4's, of samples 1 ms apart while the gimbals start within a few.
+    assert angle < 1e-7
+    assert rate < 1e-8
 
 
 def test_the_simplified_one_is_off_by_what_the_gimbals_weigh(flown: dict[str, Array]) -> None:
