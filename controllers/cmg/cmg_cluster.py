@@ -38,10 +38,8 @@ class Signals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CmgCluster(Gains):
-    """PD+ commands the torque tau, the gimbals turn at d' = -A^T (A A^T + lambda E)^-1 tau / h0."""
-
-    batched: ClassVar[bool] = True
+class ClusterGains(Gains):
+    """What the laws of clusters share: the vehicle, its gyros, and the attitude law."""
 
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """M: of the whole vehicle, body axes."""
@@ -55,6 +53,38 @@ class CmgCluster(Gains):
     """lam: with s = 0, sigma_e vanishes at this rate."""
     rate_gain: float = gain("N m s/rad", default=20.0, above=0.0)
     """Kc, the same on each axis."""
+
+    def commanded_torque(
+        self, measurement: Measurement, reference: Reference
+    ) -> tuple[Array, Array, Array]:
+        """Return the torque on the bus [N m], sigma_e and s [rad/s], each (..., 3), body axes."""
+        angle, speed = measurement.gimbal_angle, measurement.wheel_speed
+        wheel_momentum = cmg_steering.momentum(self.cluster, angle, speed)
+        return pd_plus.commanded_torque(
+            measurement.attitude,
+            measurement.rate,
+            times(self.inertia, measurement.rate) + wheel_momentum,
+            reference,
+            self.inertia,
+            self._attitude_gains,
+        )
+
+    @cached_property
+    def cluster(self) -> cmg_steering.Cluster:
+        """The gyros."""
+        return cmg_steering.Cluster(self.gimbal_axes, self.spin_axes, self.wheel_inertia)
+
+    @cached_property
+    def _attitude_gains(self) -> Array:
+        return np.array([self.attitude_gain, self.rate_gain, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class CmgCluster(ClusterGains):
+    """PD+ commands the torque tau, the gimbals turn at d' = -A^T (A A^T + lambda E)^-1 tau / h0."""
+
+    batched: ClassVar[bool] = True
+
     momentum: float = gain("N m s", default=2.0, above=0.0)
     """h0: momentum of one wheel, the scale of A."""
     measure_wanted: float = gain(default=0.5, above=0.0)
@@ -79,29 +109,13 @@ class CmgCluster(Gains):
     ) -> tuple[State, GimbalRateCommand, Signals]:
         """Return the state, the gimbal rates [rad/s] (..., n), and the signals."""
         angle, speed = measurement.gimbal_angle, measurement.wheel_speed
-        wheel_momentum = cmg_steering.momentum(self._cluster, angle, speed)
-        torque, sigma_e, s = pd_plus.commanded_torque(
-            measurement.attitude,
-            measurement.rate,
-            times(self.inertia, measurement.rate) + wheel_momentum,
-            reference,
-            self.inertia,
-            self._attitude_gains,
-        )
+        torque, sigma_e, s = self.commanded_torque(measurement, reference)
         rate, measure, damping = cmg_steering.steer(
-            self._cluster, torque, angle, speed, np.atleast_1d(time), self._steering_gains
+            self.cluster, torque, angle, speed, np.atleast_1d(time), self._steering_gains
         )
         fastest = np.max(np.abs(rate), axis=-1, keepdims=True)
         rate = rate / np.maximum(fastest / self.gimbal_rate_limit, 1.0)
         return state, GimbalRateCommand(rate), Signals(sigma_e, s, torque, measure, damping)
-
-    @cached_property
-    def _cluster(self) -> cmg_steering.Cluster:
-        return cmg_steering.Cluster(self.gimbal_axes, self.spin_axes, self.wheel_inertia)
-
-    @cached_property
-    def _attitude_gains(self) -> Array:
-        return np.array([self.attitude_gain, self.rate_gain, 0.0, 1.0])
 
     @cached_property
     def _steering_gains(self) -> Array:

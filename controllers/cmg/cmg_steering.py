@@ -65,7 +65,7 @@ def steer(
 
 
 @njit
-def _spin(g: Any, s: Any, angle: float) -> Any:
+def spin_axis(g: Any, s: Any, angle: float) -> Any:
     """Return the spin axis at a gimbal ``angle`` [rad] and its derivative by the angle."""
     c, d = math.cos(angle), math.sin(angle)
     x, y, z = g[1] * s[2] - g[2] * s[1], g[2] * s[0] - g[0] * s[2], g[0] * s[1] - g[1] * s[0]
@@ -103,7 +103,7 @@ def _dot(a: Any, b: Any) -> Any:
 def _momentum(g: Any, s0: Any, Jw: Any, angle: Any, speed: Any, h: Any) -> None:
     h[:] = 0.0
     for i in range(angle.size):
-        s, _ = _spin(g[i], s0[i], angle[i])
+        s, _ = spin_axis(g[i], s0[i], angle[i])
         for k in range(3):
             h[k] += Jw[i] * speed[i] * s[k]
 
@@ -119,7 +119,7 @@ def _steer(
     h0, m0, lambda0, e0, null_gain = gains
     xx, yy, zz, yz, xz, xy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(angle.size):
-        _, t = _spin(g[i], s0[i], angle[i])
+        _, t = spin_axis(g[i], s0[i], angle[i])
         share = Jw[i] * speed[i] / h0
         x, y, z = share * t[0], share * t[1], share * t[2]
         xx, yy, zz = xx + x * x, yy + y * y, zz + z * z
@@ -144,7 +144,7 @@ def _steer(
     measure[0], damping[0] = m, lam
     x, y, z = 0.0, 0.0, 0.0
     for i in range(angle.size):
-        s, t = _spin(g[i], s0[i], angle[i])
+        s, t = spin_axis(g[i], s0[i], angle[i])
         share = Jw[i] * speed[i] / h0
         rate[i] = share * _dot(t, direction)
         # The gradient of m^2 is 2 a'.adj(A A^T) a, with a' = -share s.
@@ -154,5 +154,5 @@ def _steer(
     # Remove the part of the gradient that gives a torque.
     removed = _product(adjugate, (x, y, z))
     for i in range(angle.size):
-        _, t = _spin(g[i], s0[i], angle[i])
+        _, t = spin_axis(g[i], s0[i], angle[i])
         rate[i] -= null_gain * Jw[i] * speed[i] / h0 * _dot(t, removed)

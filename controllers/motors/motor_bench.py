@@ -13,6 +13,7 @@ import numpy as np
 
 from mjspace.contract import Array, Gains, Measurement, Reference, VoltageCommand, gain
 
+from .deadbeat import DeadbeatLoop
 from .motor_loops import CurrentLoop, SpeedLoop, estimates
 
 
@@ -22,7 +23,8 @@ class BenchState(NamedTuple):
     speed_memory: Array
     """Memory of the speed loop, (..., 1, 9)."""
     voltage_integral: Array
-    """Integrals of the current loop [A s], (..., 1, 2)."""
+    """Memory of the current loop: integrals [A s], (..., 1, 2); of ``DeadbeatBench`` (..., 1, 3),
+    corrections [V] and the last desired current [A]."""
 
 
 class BenchSignals(NamedTuple):
@@ -39,16 +41,18 @@ class BenchSignals(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SpeedBench(Gains):
-    """Speed and current loops of one motor whose speed is ``wheel_speed``, (..., 1)."""
+class _Bench(Gains):
+    """What the benches share: all but the current loop."""
 
     batched: ClassVar[bool] = True
 
     control_period: float = gain("s", above=0.0)
     """Time from one step to the next."""
     amplitude: float = gain("rad/s", default=20.0)
-    """Of the desired speed, amplitude sin(frequency t)."""
+    """Of the desired speed, mean_speed + amplitude sin(frequency t)."""
     frequency: float = gain("rad/s", default=0.5 * pi)
+    """Of the desired speed."""
+    mean_speed: float = gain("rad/s", default=0.0)
     """Of the desired speed."""
     rotor_inertia: float = gain("kg m^2", default=0.016, above=0.0)
     """J."""
@@ -72,8 +76,9 @@ class SpeedBench(Gains):
     """k_a; zero: psi^2 stays at ``ratio``."""
     ratio: float = gain(default=0.0, at_least=0.0)
     """Initial psi^2."""
-    current_gain: float = gain("1/s", default=3000.0, above=0.0)
-    """k_ep; k_ei is k_ep R/L."""
+    clock: float = gain("rad/s", default=0.0, at_least=0.0)
+    """Of a vibration that depends on time: psi is its frequency over this rate, and at most 1.22.
+    Zero: it depends on the rotor's angle."""
     voltage_limit: float = gain("V", default=inf, above=0.0, at_most=inf)
     """Of the supply."""
     current_limit: float = gain("A", default=inf, above=0.0, at_most=inf)
@@ -93,8 +98,9 @@ class SpeedBench(Gains):
     ) -> tuple[BenchState, VoltageCommand, BenchSignals]:
         """Return the next state, the voltage and the estimates; the reference is not used."""
         speed, current = measurement.wheel_speed, measurement.current
-        desired = np.full_like(speed, self.amplitude * np.sin(self.frequency * time))
-        ahead = self.frequency * (time + 1.0 / self.current_gain)
+        swing = self.amplitude * np.sin(self.frequency * time)
+        desired = np.full_like(speed, self.mean_speed + swing)
+        ahead = self.frequency * (time + self._lag)
         slope = np.full_like(speed, self.amplitude * self.frequency * np.cos(ahead))
         memory, commanded = self._speed_loop.step(
             state.speed_memory, current, speed, desired, slope, np.zeros_like(speed)
@@ -117,10 +123,32 @@ class SpeedBench(Gains):
             observer_gain=self.observer_gain,
             vibration_gain=self.vibration_gain,
             adaptation_gain=self.adaptation_gain,
-            lead=1.0 / self.current_gain,
+            lead=self._lag,
             ratio=self.ratio,
+            clock=self.clock,
             current_limit=self.current_limit,
         )
+
+    @property
+    def _lag(self) -> float:
+        """Of the current behind the desired one [s]."""
+        raise NotImplementedError
+
+    @property
+    def _current_loop(self) -> CurrentLoop | DeadbeatLoop:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class SpeedBench(_Bench):
+    """Speed and PI current loops of one motor whose speed is ``wheel_speed``, (..., 1)."""
+
+    current_gain: float = gain("1/s", default=3000.0, above=0.0)
+    """k_ep; k_ei is k_ep R/L."""
+
+    @property
+    def _lag(self) -> float:
+        return 1.0 / self.current_gain
 
     @cached_property
     def _current_loop(self) -> CurrentLoop:
@@ -131,5 +159,29 @@ class SpeedBench(Gains):
             torque_constant=self.torque_constant,
             period=self.control_period,
             proportional_gain=self.current_gain,
+            voltage_limit=self.voltage_limit,
+        )
+
+
+@dataclass(frozen=True)
+class DeadbeatBench(_Bench):
+    """The same motor with the deadbeat current loop in place of the PI."""
+
+    correction: float = gain(default=0.1, at_least=0.0, at_most=1.0)
+    """Share of a voltage that the motor's model lacks which is learned in each period."""
+
+    @property
+    def _lag(self) -> float:
+        return self.control_period
+
+    @cached_property
+    def _current_loop(self) -> DeadbeatLoop:
+        return DeadbeatLoop(
+            pole_pairs=self.pole_pairs,
+            resistance=self.resistance,
+            inductance=self.inductance,
+            torque_constant=self.torque_constant,
+            period=self.control_period,
+            correction=self.correction,
             voltage_limit=self.voltage_limit,
         )

@@ -142,6 +142,9 @@ class SpeedLoop:
     this period to that of the current loop; without a current loop half the period."""
     ratio: Gain = 0.0
     """Initial psi^2."""
+    clock: Gain = 0.0
+    """Rate [rad/s] of a vibration that depends on time, (2.75): psi is then its frequency over this
+    rate; zero: the vibration depends on the rotor's angle, (2.76)."""
     ratio_limit: Gain = 1.5
     """Largest psi^2."""
     vibration_limit: Gain = inf
@@ -195,7 +198,7 @@ class SpeedLoop:
         W_hat, z1, z2, phi = self._observed(memory, W, speed, error, drive)
 
         psi = np.sqrt(phi)
-        angle = psi * speed * self.lead
+        angle = psi * self._turning(speed) * self.lead
         ahead = np.cos(angle) * z1 + np.sin(angle) * psi * z2
         torque = J * acceleration + load + kp * error + ki * integral - ahead  # (4.19)
         unlimited = torque / km
@@ -217,7 +220,8 @@ class SpeedLoop:
         W_before, drive_before, _, W_hat, z1_before, z2_before, phi, speed_before, _ = before
         if not np.any(self._observes):
             return W, z1_before, z2_before, phi
-        mean_W, mean_drive = 0.5 * (speed + speed_before), 0.5 * (drive + drive_before)
+        mean_W = self._turning(0.5 * (speed + speed_before))
+        mean_drive = 0.5 * (drive + drive_before)
         slip = W_hat - W_before
         psi = np.sqrt(phi + _TINY)
         turn = psi * mean_W * T
@@ -235,6 +239,12 @@ class SpeedLoop:
         found, initial = (W_hat, share * z1, share * z2, phi), (W, *before[4:7])
         chosen: Any = map(partial(np.where, self._observes), found, initial)
         return tuple(chosen)
+
+    def _turning(self, speed: Array) -> Array:
+        """Return how fast the internal model turns [rad/s], (..., m): as the rotor or a clock."""
+        if not np.any(self.clock):
+            return speed
+        return np.where(np.asarray(self.clock) > 0.0, self.clock, speed)
 
     @cached_property
     def _observes(self) -> Any:

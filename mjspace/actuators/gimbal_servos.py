@@ -1,8 +1,11 @@
-"""Speed loops on gimbals and on the wheels in them: rates in, torques on joints out."""
+"""Speed loops on gimbals and on the wheels in them: rates in, torques on joints out.
+
+Wheels may obey torques instead, as those of variable-speed CMGs do.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -42,6 +45,9 @@ class Servos(ActuatorTable, Table):
     wheel_speed: Annotated[Finite, Si("rad/s")] | None = None
     """Held, relative to the gimbal; where a wheel starts is ``initial.wheel_speed``. Required where
     a hinge is a wheel."""
+    wheels_obey: Literal["speed", "torque"] = "speed"
+    """What wheels do: keep ``wheel_speed``, or apply the command's ``wheel_torque``, as those of
+    variable-speed CMGs do."""
     wheel_torque_limit: Annotated[Positive, Si("N m")] | None = None
     """Largest torque of a wheel's motor; none when left out."""
     wheel_gain: Annotated[Positive, Si("N m s/rad")] = 0.1
@@ -54,7 +60,7 @@ class Servos(ActuatorTable, Table):
         if not hinges:
             raise ValueError("no hinge of the parts has a motor that nothing else drives")
         driven = gimbals_and_wheels(hinges)
-        if driven.wheels and self.wheel_speed is None:
+        if driven.wheels and self.wheel_speed is None and self.wheels_obey == "speed":
             raise ValueError(f"wheel_speed: missing, and {', '.join(driven.wheels)} is a wheel")
         return driven
 
@@ -87,7 +93,8 @@ class Servos(ActuatorTable, Table):
             len(of_all) - len(its)
             for of_all, its in ((every.gimbals, driven.gimbals), (every.wheels, driven.wheels))
         )
-        return GimbalServos(np.array(loops), wheel_speed, before, driven=driven)
+        kind = GimbalServos if self.wheels_obey == "speed" else VariableSpeedServos
+        return kind(np.array(loops), wheel_speed, before, driven=driven)
 
 
 @dataclass(frozen=True)
@@ -132,6 +139,45 @@ class GimbalServos(HingeMotors):
             state["servo_integral"], desired, rate, self.loops, step
         )
         in_order = torque.take(self.order, axis=-1), saturated.take(self.order, axis=-1)
+        return {"servo_integral": integral}, *in_order
+
+
+@dataclass(frozen=True)
+class VariableSpeedServos(GimbalServos):
+    """Gimbals that obey rates, and wheels that obey torques: a ``VariableSpeedCommand``."""
+
+    @property
+    def takes(self) -> Fields:
+        """The fields of a command."""
+        return {**super().takes, "wheel_torque": (len(self.wheel_speed), "N m")}
+
+    def reset(self, vehicles: int) -> State:
+        """Return integrals of zero: "servo_integral" (N, g) [rad], of the gimbals."""
+        return {"servo_integral": np.zeros((vehicles, len(self.order) - len(self.wheel_speed)))}
+
+    def limits(self) -> dict[str, tuple[Array, Array]]:
+        """Return the fastest rate of each gimbal, and the largest torque of each wheel."""
+        largest = self.loops[len(self.order) - len(self.wheel_speed) :, 2]
+        return {**super().limits(), "wheel_torque": (-largest, largest)}
+
+    def act(
+        self, state: State, command: Any, truth: Measurement, step: float
+    ) -> tuple[State, Array, Array]:
+        """Return (state, torque [N m], whether rate or torque saturates), (N, m), as the motors."""
+        count = len(self.order) - len(self.wheel_speed)
+        integral, torque, saturated = _hold_speed.ufunc(
+            state["servo_integral"],
+            command.gimbal_rate,
+            truth.gimbal_rate[..., self.before[0] :],
+            self.loops[:count],
+            step,
+        )
+        least, largest = self.limits()["wheel_torque"]
+        applied = np.minimum(np.maximum(command.wheel_torque, least), largest)
+        full = np.where(applied != command.wheel_torque, 1.0, 0.0)
+        torques = np.concatenate([torque, applied], axis=-1)
+        either = np.concatenate([saturated, full], axis=-1)
+        in_order = torques.take(self.order, axis=-1), either.take(self.order, axis=-1)
         return {"servo_integral": integral}, *in_order
 
 

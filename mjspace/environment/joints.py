@@ -30,5 +30,7 @@ def hinge(model: Any, name: str) -> tuple[int, int]:
     hinges = {model.joint(i).name: i for i in range(model.njnt) if model.jnt_type[i] == _HINGE}
     if name not in hinges:
         have = ", ".join(hinges) or "none"
-        raise ValueError(f"friction or ripple: no hinge {name!r} in the model: its hinges: {have}")
+        raise ValueError(
+            f"friction, ripple or vibration: no hinge {name!r} in the model: its hinges: {have}"
+        )
     return int(model.jnt_dofadr[hinges[name]]), int(model.jnt_qposadr[hinges[name]])

@@ -10,14 +10,18 @@ from mjspace.environment.bearing_friction import BearingFriction
 from mjspace.environment.compiled import compiled
 from mjspace.environment.connection import Latch
 from mjspace.environment.torque_ripple import TorqueRipple
+from mjspace.environment.vibration import HingeVibration
 from mjspace.scenario.declared import tables_in, type_of
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.plant import PlantTable
 
-OF_PLANT: tuple[type[BearingFriction] | type[TorqueRipple] | type[Latch], ...] = (
+OF_PLANT: tuple[
+    type[BearingFriction] | type[TorqueRipple] | type[Latch] | type[HingeVibration], ...
+] = (
     BearingFriction,
     TorqueRipple,
     Latch,
+    HingeVibration,
 )
 
 

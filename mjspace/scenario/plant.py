@@ -134,6 +134,11 @@ class PlantTable(Table):
         Annotated[Any, DeclaredIn("mjspace.environment.torque_ripple:Ripple", optional=False)],
     ] = {}
     """Torque ripple of motors, by the hinge."""
+    vibration: dict[
+        JointName,
+        Annotated[Any, DeclaredIn("mjspace.environment.vibration:Vibration", optional=False)],
+    ] = {}
+    """Vibration torques of a constant frequency, by the hinge."""
     ground: Annotated[Any, DeclaredIn("mjspace.vehicle.ground:Ground")] = None
     """What is below it; nothing when left out."""
     ports: dict[Name, Port] = {}

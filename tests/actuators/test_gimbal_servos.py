@@ -11,7 +11,7 @@ from mjspace.controllers.cmg.cmg_steering import Cluster, momentum
 from mjspace.actuators.base import Context
 from mjspace.actuators.driven_hinges import gimbals_and_wheels
 from mjspace.actuators.gimbal_servos import GimbalServos, Servos
-from mjspace.contract import Array, GimbalRateCommand, Measurement
+from mjspace.contract import Array, GimbalRateCommand, Measurement, VariableSpeedCommand
 from mjspace.errors import FlightError, InputError
 from mjspace.runner.replay import verify
 from mjspace.runner.run import run
@@ -46,6 +46,23 @@ def act(
     )
     after, torque, cut = flown.act(state, GimbalRateCommand(np.array([wanted])), seen, STEP)
     return after, torque[0], cut[0]
+
+
+def test_wheels_that_obey_torques_apply_them_within_their_limit() -> None:
+    limits = {"wheel_torque_limit": 0.5, "torque_limit": 2.0, "rate_limit": 1.0}
+    both, held = servos(**limits, wheels_obey="torque"), servos(**limits)
+    command = VariableSpeedCommand(np.array([[0.3, 4.0]]), np.array([[0.2, -0.7]]))
+    still = np.zeros((1, 2))
+    seen = Measurement(
+        attitude=NONE, rate=NONE, wheel_speed=still, gimbal_angle=still, gimbal_rate=still
+    )
+    after, torque, cut = both.act(both.reset(1), command, seen, STEP)
+    np.testing.assert_array_equal(torque[0, 1::2], [0.2, -0.5])  # gimbal, wheel, gimbal, wheel
+    np.testing.assert_array_equal(cut[0], [0.0, 0.0, 1.0, 1.0])
+    # The gimbals are those of wheels that keep their speed.
+    others, expected, _ = held.act(held.reset(1), command, seen, STEP)
+    np.testing.assert_array_equal(torque[0, ::2], expected[0, ::2])
+    np.testing.assert_array_equal(after["servo_integral"], others["servo_integral"][:, :2])
 
 
 def flown(overrides: list[str]) -> tuple[Assembly, dict[str, dict[str, Array]]]:

@@ -352,3 +352,24 @@ def test_the_bench_law_is_its_loops() -> None:
     assert np.abs(signals.speed_error[:, 0]).max() < 1e-3  # without rejection 1.25e-2 rad/s
     with pytest.raises(ValueError, match=r"steps of RK4 at most 3\.1e-07 s"):
         SpeedBench(STEP, current_gain=9e6)
+
+
+def test_at_a_constant_speed_a_clock_of_that_rate_is_the_rotor() -> None:
+    speed = np.full(1, 30.0)
+    by_angle, by_time = (
+        SpeedLoop(J, KM, STEP, speed_gain=8.0, lead=1.0 / KEP, clock=clock, **OBSERVER)
+        for clock in (0.0, 30.0)
+    )
+    memories = [by_angle.reset(speed)] * 2
+    still = np.zeros(1)
+    for k in range(200):
+        current = np.full((1, 2), 0.1 * np.cos(6.0 * STEP * k))
+        memories = [
+            loop.step(memory, current, speed, speed + 0.1, still, still)[0]
+            for loop, memory in zip((by_angle, by_time), memories, strict=True)
+        ]
+    np.testing.assert_array_equal(*memories)
+    slower = by_time.step(memories[1], current, 0.5 * speed, speed, still, still)[0]
+    assert np.any(
+        slower != by_angle.step(memories[0], current, 0.5 * speed, speed, still, still)[0]
+    )

@@ -93,3 +93,19 @@ def test_a_motor_gets_the_same_bits_alone_and_in_a_batch() -> None:
 def test_a_bandwidth_of_nothing_is_refused() -> None:
     with pytest.raises(ValueError, match=r"tracking_bandwidth: got -1\.0 rad/s"):
         SpeedObserver(P, R, L, KM, STEP, tracking_bandwidth=-1.0)
+
+
+def test_currents_do_not_show_the_angle_of_a_rotor_at_rest_and_do_of_one_that_turns() -> None:
+    """Signal injection needs windings whose inductance depends on the angle: these have one."""
+    drives = Drives(*(np.full(2, value) for value in (4.0, 2.5, 4.5e-3, 1.5, np.inf, 1.0)))
+    angle = np.array([0.0, 0.2])
+    apart = []
+    for speed in (np.zeros(2), np.full(2, 0.1)):
+        current = drives.reset()
+        for k in range(20):
+            injected = 5.0 * np.array([np.cos(0.6 * k), np.sin(0.6 * k)])
+            there = angle + 1e-4 * k * speed
+            current, _, _ = drives.advance(current, np.tile(injected, (2, 1)), speed, 1e-4, there)
+        apart.append(np.abs(current[1] - current[0]).max())
+    assert apart[0] < 1e-14  # rounding of 0.3 A
+    assert apart[1] > 1e-2
