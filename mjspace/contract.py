@@ -141,8 +141,7 @@ those, wheel speeds come from the tachometers, which every vehicle has."""
 class Truth(NamedTuple):
     """The true state and surroundings at an instant, as a disturbance in Python receives them.
 
-    Fields that ``Measurement`` has too are described there. They do not depend on the vehicle's
-    sensors; what a vehicle or its environment lacks is of shape ``(0,)``.
+    ``Measurement`` describes its fields; no sensor is between. What is lacking has shape ``(0,)``.
     """
 
     attitude: Array
@@ -184,14 +183,11 @@ class Reference(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """A ``Reference`` with the desired position of the vehicle as well."""
+    """A ``Reference``, which describes the first fields, with the vehicle's desired position."""
 
     attitude: Array
-    """Quaternion, scalar first, desired body axes to inertial, shape (..., 4)."""
     rate: Annotated[Array, Unit("rad/s")]
-    """Angular velocity of the desired axes, in the desired axes [rad/s], shape (..., 3)."""
     acceleration: Annotated[Array, Unit("rad/s^2")]
-    """Time derivative of the components of ``rate`` [rad/s^2], shape (..., 3)."""
     position: Annotated[Array, Unit("m")]
     """Inertial axes [m], shape (..., 3)."""
     velocity: Annotated[Array, Unit("m/s")]

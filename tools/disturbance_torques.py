@@ -30,6 +30,7 @@ from mjspace.vehicle import vehicle
 PICTURE = Path(__file__).parents[1] / "docs/disturbance_torques.png"
 ALTITUDES = 1e3 * np.geomspace(200.0, 40000.0, 40)  # m
 LISTED = 1e3 * np.array([200.0, 400.0, 600.0, 800.0, 1000.0, 20200.0, 35786.0])
+TICKS = (200, 500, 1000, 2000, 5000, 10000, 20000, 40000)  # km
 HIGHEST_AIR = 1500e3  # m: above, NRLMSIS has little to say
 FLUXES = {"drag, quiet Sun": 70.0, "drag, active Sun": 230.0}
 PLACES, ATTITUDES = 24, 48
@@ -122,7 +123,8 @@ def draw(path: Path) -> None:
             panel.loglog(1e-3 * ALTITUDES, values, color=color, label=name)
         panel.set_xlabel("altitude [km]")
         panel.set_ylabel("largest torque [N m]")
-        panel.set_ylim(1e-8, 2e-2)
+        panel.set_xticks(TICKS, [f"{tick:,}" for tick in TICKS])
+        panel.set_ylim(1e-8, 0.2)
         panel.legend(frameon=False)
         page.savefig(path, dpi=150)
 

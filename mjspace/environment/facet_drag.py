@@ -4,7 +4,7 @@ import math
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from mjspace.contract import Array
 from mjspace.environment import cubics, joints, kepler
@@ -139,7 +139,7 @@ class FacetDrag(Term):
 
     kernels: ClassVar = {9: drag, 13: drag_along}
 
-    facets: Annotated[list[Facet], Field(min_length=1)] | None = None
+    facets: list[Facet] = []
     """Each feels the flow on its outward side; those of the environment when left out."""
     density: Annotated[Positive, Si("kg/m^3")] | None = None
     """Constant or, with ``scale_height``, at ``reference_altitude``; the default atmosphere's when
@@ -177,7 +177,7 @@ class FacetDrag(Term):
         orbit = environment.orbit
         if orbit is None:
             raise ValueError("facet_drag: needs an orbit")
-        if (self.facets is None) == (not environment.facets):
+        if bool(self.facets) == bool(environment.facets):
             raise ValueError(
                 "facet_drag: needs [[environment.facets]], or facets of its own, not both"
             )

@@ -42,6 +42,15 @@ def position(orbit: Any, time: float) -> tuple[float, float, float]:
 
 
 @compiled
+def positions(rows: Any, times: Any) -> Any:
+    """Return the positions [m], (n, 3), at ``times`` [s], (n,), with the elements ``rows``."""
+    found = np.empty((len(times), 3))
+    for i in range(len(times)):
+        found[i, 0], found[i, 1], found[i, 2] = position(rows[i], times[i])
+    return found
+
+
+@compiled
 def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
     """Return the velocity [m/s], inertial axes, at ``time`` [s]; ``orbit`` as for ``position``."""
     anomaly = eccentric_anomaly(orbit[2] + orbit[1] * time, orbit[3])

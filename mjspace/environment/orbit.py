@@ -98,9 +98,26 @@ class Orbit(Term):
         return self.elements()
 
     def elements(self) -> Array:
-        """Return the elements at time zero: ``rows`` of it."""
-        row: Array = self.rows(np.zeros(1))[0]
-        return row
+        """Return what ``kepler.position`` and ``kepler.velocity`` read at time zero, ten numbers.
+
+        GM [m^3/s^2], mean motion [rad/s], mean anomaly at time zero [rad], eccentricity, then the
+        two semi-axes as vectors [m], towards the periapsis and along the motion there.
+        """
+        a, e = self.semi_major_axis, self.eccentricity
+        gm = GM[self.body]
+        half = math.atan2(
+            math.sqrt(1.0 - e) * math.sin(0.5 * self.true_anomaly),
+            math.sqrt(1.0 + e) * math.cos(0.5 * self.true_anomaly),
+        )
+        mean_anomaly = 2.0 * half - e * math.sin(2.0 * half)
+        # columns: towards the ascending node and 90 deg ahead of it in the orbit
+        node, tilt = self.ascending_node, self.inclination
+        ahead = [-math.sin(node) * math.cos(tilt), math.cos(node) * math.cos(tilt), math.sin(tilt)]
+        plane = np.column_stack([[math.cos(node), math.sin(node), 0.0], ahead])
+        cosine, sine = math.cos(self.periapsis), math.sin(self.periapsis)
+        major = a * plane @ [cosine, sine]
+        minor = a * math.sqrt(1.0 - e * e) * plane @ [-sine, cosine]
+        return np.array([gm, math.sqrt(gm / a**3), mean_anomaly, e, *major, *minor])
 
     def drifts(self) -> tuple[float, float, float]:
         """Return the secular rates of node, periapsis and mean anomaly, less the Kepler orbit's.
@@ -121,37 +138,23 @@ class Orbit(Term):
         )
 
     def rows(self, time: Array) -> Array:
-        """Return what ``kepler.position`` and ``kepler.velocity`` read at ``time`` [s], (n, 10).
-
-        GM [m^3/s^2], mean motion [rad/s], mean anomaly at time zero [rad], eccentricity, then the
-        two semi-axes as vectors [m], towards the periapsis and along the motion there.
-        """
-        a, e = self.semi_major_axis, self.eccentricity
-        gm = GM[self.body]
-        half = math.atan2(
-            math.sqrt(1.0 - e) * math.sin(0.5 * self.true_anomaly),
-            math.sqrt(1.0 + e) * math.cos(0.5 * self.true_anomaly),
-        )
-        mean_anomaly = 2.0 * half - e * math.sin(2.0 * half)
-        node_rate, periapsis_rate, anomaly_rate = self.drifts()
-        scalars = [gm, math.sqrt(gm / a**3) + anomaly_rate, mean_anomaly, e]
-        rows = []
-        for instant in time:
-            node = self.ascending_node + node_rate * instant
-            periapsis = self.periapsis + periapsis_rate * instant
-            rows.append([*scalars, *_semi_axes(a, e, self.inclination, node, periapsis)])
-        return np.array(rows)
-
-
-def _semi_axes(a: float, e: float, tilt: float, node: float, periapsis: float) -> list[float]:
-    """Return the two semi-axes [m] of an ellipse as vectors, towards the periapsis and ahead."""
-    # columns: towards the ascending node and 90 deg ahead of it in the orbit
-    ahead = [-math.sin(node) * math.cos(tilt), math.cos(node) * math.cos(tilt), math.sin(tilt)]
-    plane = np.column_stack([[math.cos(node), math.sin(node), 0.0], ahead])
-    cosine, sine = math.cos(periapsis), math.sin(periapsis)
-    major = a * plane @ [cosine, sine]
-    minor = a * math.sqrt(1.0 - e * e) * plane @ [-sine, cosine]
-    return [*major, *minor]
+        """Return the elements that hold at each ``time`` [s], (n,), as (n, 10)."""
+        rows = np.tile(self.elements(), (len(time), 1))
+        if not self.j2:
+            return rows
+        node, periapsis, anomaly = self.drifts()
+        rows[:, 1] += anomaly
+        shrink = math.sqrt(1.0 - self.eccentricity**2)
+        cosine, sine = np.cos(periapsis * time)[:, None], np.sin(periapsis * time)[:, None]
+        major, minor = rows[:, 4:7].copy(), rows[:, 7:].copy()
+        rows[:, 4:7] = cosine * major + sine / shrink * minor
+        rows[:, 7:] = cosine * minor - shrink * sine * major
+        cosine, sine = np.cos(node * time), np.sin(node * time)
+        for x in (4, 7):  # about the Earth's axis
+            turned = cosine * rows[:, x] - sine * rows[:, x + 1]
+            rows[:, x + 1] = sine * rows[:, x] + cosine * rows[:, x + 1]
+            rows[:, x] = turned
+        return rows
 
 
 def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
@@ -161,6 +164,5 @@ def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
     """
     times = np.asarray(time, dtype=np.float64)
     instants = times.ravel()
-    rows = orbit.rows(instants) if orbit.j2 else np.tile(orbit.elements(), (times.size, 1))
-    positions = [kepler.position(row, instant) for row, instant in zip(rows, instants, strict=True)]
+    positions = kepler.positions(orbit.rows(instants), instants)
     return np.reshape(positions, (*times.shape, 3))

@@ -46,15 +46,25 @@ def press(payload: Any, time: float, bodies: Bodies) -> None:
     pressure = light * sun[cubics.SIZE + 2] / distance2
     unit = 1.0 / math.sqrt(distance2)
     sx, sy, sz = in_bus_axes(bodies, unit * sx, unit * sy, unit * sz)
+    fx = fy = fz = tx = ty = tz = 0.0
     for i in range(_FACETS, payload.size, _WIDTH):
-        n, arm = payload[i + 3 : i + 6], payload[i + 6 : i + 9]
-        cosine = n[0] * sx + n[1] * sy + n[2] * sz
+        nx, ny, nz = payload[i + 3], payload[i + 4], payload[i + 5]
+        cosine = nx * sx + ny * sy + nz * sz
         if cosine > 0.0:
             scale = -pressure * cosine
             ray = scale * payload[i]
             normal = scale * (payload[i + 1] * cosine + payload[i + 2])
-            force = (ray * sx + normal * n[0], ray * sy + normal * n[1], ray * sz + normal * n[2])
-            add_force_on_bus(bodies, arm, force)
+            px, py, pz = ray * sx + normal * nx, ray * sy + normal * ny, ray * sz + normal * nz
+            ax, ay, az = payload[i + 6], payload[i + 7], payload[i + 8]
+            fx, fy, fz = fx + px, fy + py, fz + pz
+            tx += ay * pz - az * py
+            ty += az * px - ax * pz
+            tz += ax * py - ay * px
+    add_force_on_bus(bodies, (0.0, 0.0, 0.0), (fx, fy, fz))
+    dof = bodies.bus_dof + 3
+    bodies.qfrc_passive[dof] += tx
+    bodies.qfrc_passive[dof + 1] += ty
+    bodies.qfrc_passive[dof + 2] += tz
 
 
 class SolarPressure(Term):

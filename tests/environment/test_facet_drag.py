@@ -178,7 +178,10 @@ HIGH = {"semi_major_axis": 7e6}
             },
             "scale_height: needs the density at reference_altitude",
         ),
-        ({"facet_drag": {"facets": []}, "orbit": HIGH}, "at least 1 item"),
+        (
+            {"facet_drag": {"facets": []}, "orbit": HIGH},
+            r"facet_drag: needs \[\[environment.facets\]\], or facets of its own, not both",
+        ),
     ],
 )
 def test_drag_without_air_is_refused(environment: dict[str, Any], message: str) -> None:

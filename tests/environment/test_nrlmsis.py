@@ -49,11 +49,14 @@ def test_an_active_sun_makes_the_air_denser() -> None:
     assert stormy > 1.3 * quiet
 
 
-def test_noon_is_denser_than_night_where_the_sun_is() -> None:
-    # the bulge is two hours behind the Sun, which is over Greenwich at noon: at about 30 deg east
+@pytest.mark.parametrize("hour", [0, 6, 12, 18])
+def test_noon_is_denser_than_night_where_the_sun_is(hour: int) -> None:
+    # the bulge is two hours behind the Sun, at about 30 deg east of it
     angles = np.radians(np.arange(0.0, 360.0, 15.0))
     place = 6.878e6 * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
-    density, _ = nrlmsis.density_at(EPOCH, Nrlmsis(f107=150), place, np.zeros(len(angles)))
+    density, _ = nrlmsis.density_at(
+        EPOCH.replace(hour=hour), Nrlmsis(f107=150), place, np.zeros(len(angles))
+    )
     # inertial x is at the equinox, where the Sun is on 20 March
     assert 15.0 <= np.degrees(angles[np.argmax(density)]) <= 60.0
     assert density.max() > 3.0 * density.min()
