@@ -50,7 +50,7 @@ class HingeVibration(Term):
         """Return the plant's vibration; nothing where there is none."""
         return [cls(vibrations=plant.vibration)] if plant.vibration else []
 
-    def payload_size(self) -> int:
+    def payload_size(self, environment: Environment) -> int:
         """Return four numbers for each hinge."""
         return 4 * len(self.vibrations)
 
