@@ -27,7 +27,7 @@ def scenarios() -> list[Scenario]:
     return [load(name)[0] for name in scenario_names()]
 
 
-_RCS = load("rcs-three-axis")[0].plant.rcs
+_RCS = load("rcs-coarse-fine")[0].plant.rcs
 assert _RCS is not None
 FACTS: dict[str, Any] = {
     "inertia": np.diag([10.0, 11.0, 12.0]),
@@ -43,7 +43,7 @@ FACTS: dict[str, Any] = {
     "link_inertia": np.array([0.7, 0.3]),
     "thruster_positions": np.array(_RCS.positions),
     "thruster_directions": np.array(_RCS.unit_directions),
-    "thruster_force": np.full(len(_RCS.positions), _RCS.thrust),
+    "thruster_force": _RCS.of_each("thrust"),
 }
 
 

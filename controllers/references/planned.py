@@ -24,9 +24,9 @@ class Planned(Gains):
     inertia: Array = gain("kg m^2", (3, 3), form="inertia")
     """Of the body that was planned for, about its centre of mass, body axes."""
     control_period: float = gain("s", above=0.0)
-    time: Array = gain("s", (None,), form="increasing")
+    time: Array = gain("s", ("instant",), form="increasing")
     """Of the start, the switches and the end: one more than rows of ``torque``."""
-    torque: Array = gain("N m", (None, 3))
+    torque: Array = gain("N m", ("row", 3))
     """Between two of these times, body axes."""
     start_attitude: Array = gain(shape=(4,), default=(1.0, 0.0, 0.0, 0.0), form="quaternion")
     """At rest, until the first time: quaternion, scalar first, body to inertial; normalized."""

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mjspace.contract import Array, gain
+from mjspace.contract import Array, Gains, gain
 
 from .relays import PhasePlane
 
@@ -36,6 +36,7 @@ class CoarseFine(PhasePlane):
     """k."""
 
     def __post_init__(self) -> None:
+        Gains.__post_init__(self)  # before the sets, of which the base makes patterns
         small = self.thruster_force < self.fine_below
         if small.all() or not small.any():
             raise ValueError(
