@@ -234,15 +234,6 @@ class GimbalRateCommand(NamedTuple):
     """Relative to what carries each [rad/s], shape (..., g)."""
 
 
-class VariableSpeedCommand(NamedTuple):
-    """A law's command to variable-speed CMGs: rates of the gimbals, torques of the wheels."""
-
-    gimbal_rate: Annotated[Array, Unit("rad/s")]
-    """Relative to what carries each [rad/s], shape (..., g)."""
-    wheel_torque: Annotated[Array, Unit("N m")]
-    """Of each wheel's motor, on its rotor [N m], shape (..., n)."""
-
-
 class ThrustCommand(NamedTuple):
     """A law's command to an engine on two gimbals."""
 
@@ -269,9 +260,9 @@ class Law(Protocol):
     A law that says ``batched = True`` handles any leading axes; another sees the arrays of one
     vehicle and is flown one by one. Reaction wheels obey a ``TorqueCommand``, or any command with
     that field; motors with an electrical side a ``VoltageCommand``; gimbals with speed loops a
-    ``GimbalRateCommand``, or with wheels that obey torques a ``VariableSpeedCommand``; an engine on
-    gimbals a ``ThrustCommand``, on/off thrusters a ``PulseCommand``, arms any command with a field
-    ``joint_torque``. ``reference`` is a row of the scenario's reference: ``DesiredMotion``.
+    ``GimbalRateCommand``; an engine on gimbals a ``ThrustCommand``, on/off thrusters a
+    ``PulseCommand``, arms any command with a field ``joint_torque``. ``reference`` is a row of the
+    scenario's reference: ``DesiredMotion``.
 
     Laws are flown compiled where that is possible: ``step`` is called once on arrays that note what
     is computed with them, and for the first of at most 2000 periods. One that has to be called in

@@ -7,11 +7,11 @@ arrays may have leading vehicle axes.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Reference, VariableSpeedCommand, gain
+from mjspace.contract import Array, Measurement, Reference, Unit, gain
 
 from ..references.powered import PoweredReference
 from . import vscmg_steering
@@ -23,6 +23,15 @@ class State(NamedTuple):
 
     start_energy: Array
     """Of the wheels less what the profile had stored, at the start [J], (..., 1)."""
+
+
+class VariableSpeedCommand(NamedTuple):
+    """Command to gimbals with speed loops, and to wheels that obey torques."""
+
+    gimbal_rate: Annotated[Array, Unit("rad/s")]
+    """Relative to what carries each [rad/s], (..., n)."""
+    wheel_torque: Annotated[Array, Unit("N m")]
+    """Of each wheel's motor, on its rotor [N m], (..., n)."""
 
 
 class Signals(NamedTuple):

@@ -144,7 +144,7 @@ class GimbalServos(HingeMotors):
 
 @dataclass(frozen=True)
 class VariableSpeedServos(GimbalServos):
-    """Gimbals that obey rates, and wheels that obey torques: a ``VariableSpeedCommand``."""
+    """Gimbals that obey a command's ``gimbal_rate``, and wheels that obey its ``wheel_torque``."""
 
     @property
     def takes(self) -> Fields:

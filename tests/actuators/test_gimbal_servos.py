@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from mjspace.controllers.cmg.cmg_steering import Cluster, momentum
+from mjspace.controllers.cmg.vscmg_cluster import VariableSpeedCommand
 
 from mjspace.actuators.base import Context
 from mjspace.actuators.driven_hinges import gimbals_and_wheels
 from mjspace.actuators.gimbal_servos import GimbalServos, Servos
-from mjspace.contract import Array, GimbalRateCommand, Measurement, VariableSpeedCommand
+from mjspace.contract import Array, GimbalRateCommand, Measurement
 from mjspace.errors import FlightError, InputError
 from mjspace.runner.replay import verify
 from mjspace.runner.run import run
