@@ -43,11 +43,11 @@ class Signals(NamedTuple):
     """Composite error [rad/s], body axes, (..., 3)."""
     torque: Array
     """Commanded torque on the bus [N m], body axes, (..., 3)."""
-    power: Array
+    power: Annotated[Array, Unit("W")]
     """Commanded into the wheels [W], (..., 1)."""
-    energy_error: Array
+    energy_error: Annotated[Array, Unit("J")]
     """Measured less desired energy in the wheels [J], (..., 1)."""
-    spread: Array
+    spread: Annotated[Array, Unit("rad/s")]
     """Of the wheel speeds: largest less least [rad/s], (..., 1)."""
 
 
