@@ -115,8 +115,8 @@ SCENARIOS = {
         "the deployment",
         2,
     ),
-    "magnetic field": ("b-dot-igrf", ["duration=200"], "the magnetic field", 0),
-    "desaturation-magnetic": ("desaturation-magnetic", ["duration=30"], "the magnetic field", 0),
+    "magnetic field": ("b-dot-igrf", ["duration=200"], "the environment", 0),
+    "desaturation-magnetic": ("desaturation-magnetic", ["duration=30"], "the environment", 0),
 }
 
 
