@@ -71,7 +71,8 @@ def value(dispersion: Dispersion, nominal: Any, u: Array) -> Any:
             return float(stats.triang.ppf(u[0], (mode - d.low) / span, d.low, span))
         case "discrete":
             chosen = d.values[int(u[0] * len(d.values))]
-            return chosen if type(chosen) is int else float(chosen)
+            whole = isinstance(nominal, int) and chosen == int(chosen)
+            return int(chosen) if whole else float(chosen)
         case "random_attitude":
             return random_attitude(u)
         case _:

@@ -133,7 +133,7 @@ def _worst(store: Store, member: int, check: int) -> Worst:
 
 def _bound(check: Check) -> str:
     bounds = (("<", check.below), (">", check.above))
-    return " and ".join(f"{sign} {bound:.6g}" for sign, bound in bounds if bound is not None)
+    return " and ".join(f"{sign} {bound:.4g}" for sign, bound in bounds if bound is not None)
 
 
 def data(found: Answer) -> dict[str, Any]:
@@ -188,13 +188,14 @@ def show(found: Answer) -> None:
 
 
 def _show_checks(console: Console, found: Answer) -> None:
-    titles = (">failed", ">min", ">5 %", ">median", ">95 %", ">max", "required")
+    titles = (">failed", ">min", ">5 %", ">median", ">95 %", ">max")
     table = _table(">", "check", *titles)
     for number, check in enumerate(found.checks, 1):
         spread = check.measured
         values = dataclasses.astuple(spread) if spread else ()
-        cells = [f"{value:.4g}" for value in values] or ["-"] * 5
-        table.add_row(str(number), _plain(check.name), str(check.failed), *cells, check.bound)
+        cells = [f"{value:.3g}" for value in values] or ["-"] * 5
+        name = _plain(f"{check.name} {check.bound}")
+        table.add_row(str(number), name, str(check.failed), *cells)
     console.print(table)
 
 
@@ -213,7 +214,12 @@ def _show_correlations(console: Console, found: Answer) -> None:
 def _table(*titles: str) -> Table:
     table = Table(box=None, pad_edge=False, header_style="bold")
     for title in titles:
-        table.add_column(title.lstrip(">"), justify="right" if title[0] == ">" else "left")
+        is_number = title.startswith(">")
+        table.add_column(
+            title.lstrip(">"),
+            justify="right" if is_number else "left",
+            no_wrap=is_number or title == "log",
+        )
     return table
 
 

@@ -4,17 +4,10 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    Field,
-    ValidatorFunctionWrapHandler,
-    field_serializer,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, field_serializer, field_validator, model_validator
 
-from mjspace.ranges import numbers
 from mjspace.scenario.fields import AnyUnit, Finite, NonNegative, Table
-from mjspace.units import Quantity, to_si
+from mjspace.units import Quantity
 
 REQUIRED = {
     "normal": ("std",),
@@ -60,7 +53,7 @@ class Dispersion(Table):
     """Largest value, greater than ``low``."""
     mode: _Number | None = None
     """Most likely value of ``triangular``; the scenario's own value when left out."""
-    values: Annotated[list[Any], Field(min_length=1)] | None = None
+    values: Annotated[list[_Number], Field(min_length=1)] | None = None
     """Of ``discrete``: numbers in SI or quantities, each as likely as the others."""
     radius: Annotated[NonNegative, AnyUnit] | None = None
     """Length of the vector of ``on_sphere``."""
@@ -81,15 +74,10 @@ class Dispersion(Table):
             raise ValueError(f"{key!r} is no part of the flight")
         return key
 
-    @field_validator("values", mode="wrap")
-    @classmethod
-    def _numbers(cls, value: Any, inner: ValidatorFunctionWrapHandler) -> Any:
-        return inner(_in_si(value)) if isinstance(value, list) else inner(value)
-
     @field_serializer("values")
     def _plain(self, values: Any) -> Any:
         # Pydantic warns of quantities in a list.
-        return values if values is None else [v if type(v) is int else float(v) for v in values]
+        return values if values is None else [float(value) for value in values]
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -149,12 +137,3 @@ def refuse_overlaps(dispersions: Sequence[Dispersion]) -> None:
                 raise ValueError(
                     f"dispersions.{number}.key: {one.key!r} and {other.key!r} set the same number"
                 )
-
-
-def _in_si(values: list[Any]) -> list[Any]:
-    found: list[Any] = to_si(values, None)
-    if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in found):
-        raise ValueError(f"got {values!r}, should be numbers")
-    if not abs(numbers(found)).max(initial=0.0) < float("inf"):
-        raise ValueError(f"got {values!r}, should be finite")
-    return found

@@ -303,18 +303,18 @@ def test_processes_make_the_same_table_and_a_known_rate_is_inside_its_interval(
 
     text = SCENARIO.replace("duration = 0.1", "duration = 0.005")
     right, inside = norm.cdf((0.31 - 0.3) / np.radians(1.0)), 0
-    for seed in range(40):
+    for seed in range(20):
         out = tmp_path / str(seed)
-        what = Campaign(scenario(tmp_path, text), (), 60, seed=seed)
+        what = Campaign(scenario(tmp_path, text), (), 40, seed=seed)
         everyone = population(what)
         with Store(out, everyone).opened():
             store = Store(out, everyone)
-            store.write(fly_members(Call(what, everyone.identity, tuple(range(60)), "none", out)))
+            store.write(fly_members(Call(what, everyone.identity, tuple(range(40)), "none", out)))
         low, high = report.answer(store, None).interval
         inside += low < right < high
-    # 95 % of 40 campaigns; fewer than that many are in 1 of 1000 such tests.
-    assert inside >= binom.ppf(0.001, 40, 0.95)
-    what = Campaign(scenario(tmp_path, text), (), 60, seed=0)
+    # 95 % of 20 campaigns; fewer than that many are in 1 of 1000 such tests.
+    assert inside >= binom.ppf(0.001, 20, 0.95)
+    what = Campaign(scenario(tmp_path, text), (), 40, seed=0)
     two = fly(what, tmp_path / "two", processes=2, block=7, keep="none")
     one = Store(tmp_path / "0", population(what)).read().drop_columns([WALL_TIME])
     assert bytes_of(two) == bytes_of(one)
