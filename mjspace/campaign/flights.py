@@ -1,9 +1,11 @@
 """Flying some members of a campaign, in a batch where they differ in where they start alone."""
 
+import json
 import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -70,11 +72,7 @@ def fly_members(call: Call) -> list[Flown]:
         FlightError: a draw did not arrive in the flight; or a member alone is not as in a batch.
         OSError: a log cannot be written.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # shown where the campaign began
-        members = population(call.campaign)
-    if members.identity != call.identity:
-        raise InputError(f"{members.path}: the scenario, or its law, changed during the campaign")
+    members = _same(call.campaign, json.dumps(call.identity))
     if together(members):
         flown = _batch(members, call.members)
     else:
@@ -83,6 +81,21 @@ def fly_members(call: Call) -> list[Flown]:
         if call.keep == "all" or (call.keep == "failures" and not one.passed):
             _keep_log(members, one, log_of(call.out, one.member))
     return flown
+
+
+@lru_cache(maxsize=1)
+def _same(campaign: Campaign, identity: str) -> Population:
+    """Return the members, once for the calls of a process, if they are those that began.
+
+    Raises:
+        InputError: the files have changed since.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # shown where the campaign began
+        members = population(campaign)
+    if json.dumps(members.identity) != identity:
+        raise InputError(f"{members.path}: the scenario, or its law, changed during the campaign")
+    return members
 
 
 def together(members: Population) -> bool:

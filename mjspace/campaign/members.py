@@ -5,7 +5,7 @@ import hashlib
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -117,9 +117,8 @@ class Population:
         return assembly, drawn
 
 
-@lru_cache(maxsize=1)
 def population(campaign: Campaign) -> Population:
-    """Return the members of the campaign, once for consecutive calls in a process.
+    """Return the members of the campaign; its files are read.
 
     Raises:
         InputError: bad input, in one line.

@@ -87,7 +87,7 @@ class Store:
         here = self.folder.is_dir() and any(self.folder.iterdir())
         if here and not description.is_file():
             raise InputError(f"{self.folder}: holds something else: give another folder by --out")
-        if here:
+        if here and self._files():  # else nothing is lost with what was tried before
             self._refuse_another(description)
         make_folder(self._blocks)
         with (self.folder / "lock").open("ab") as file:

@@ -252,8 +252,9 @@ def test_bad_input_is_one_line(
 ) -> None:
     what = Campaign(scenario(tmp_path), (), 3, seed=1)
     out = tmp_path / "out"
-    with Store(out, population(what)).opened():
-        pass
+    store = Store(out, population(what))
+    with store.opened():
+        store.write([Flown(0, [0.3], [], "it was stopped", 1.0)])
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     usual = ["campaign", what.scenario, "--out", str(out)]
     for option, value in (("--n", "3"), ("--seed", "1")):
@@ -273,6 +274,15 @@ def test_a_draw_that_the_scenario_does_not_admit_names_the_member(tmp_path: Path
     bad = next(m for m in range(20) if everyone.drawn([m])[0][1] < 0.0)
     with pytest.raises(InputError, match=f"member {bad} of the campaign: .*plant.mass: got -"):
         everyone.member(bad)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_campaign_that_could_not_begin_leaves_its_folder_free(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    text = SCENARIO.replace("truth.rate[0]", "truth.rat")
+    with pytest.raises(InputError, match=r"checks.0.signal: .*did you mean 'truth.rate'"):
+        campaigns.fly(Campaign(scenario(tmp_path, text), (), 1, seed=1), out)
+    fly(Campaign(scenario(tmp_path), (), 1, seed=1), out)
 
 
 @pytest.mark.usefixtures("here")
