@@ -1,6 +1,6 @@
 """The command line: ``list``, ``info``, ``run``, ``replay``, ``render``, ``plot``, ``validate``.
 
-``convert`` and ``compare`` are for logs,
+``campaign`` flies a scenario many times. ``convert`` and ``compare`` are for logs,
 ``law-header``, ``serve-law`` and ``linearize`` for flight software; ``recover`` saves what is whole
 of a damaged log. Exit status: 0 every check came out as the scenario expects, 1 flown but one did
 not (or a replay or a comparison differed, or the flight ended early), 2 bad input. Modules are
@@ -15,6 +15,7 @@ import typer
 
 from mjspace import __version__
 from mjspace.cli import (
+    campaigns,
     data,
     flight_software,
     flights,
@@ -53,6 +54,7 @@ app.command()(models.inspect)
 app.command()(models.new)
 app.command()(flights.run)
 app.command()(flights.replay)
+app.command()(campaigns.campaign)
 app.command()(pictures.render)
 app.command()(pictures.plot)
 app.command()(data.convert)

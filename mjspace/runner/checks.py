@@ -66,6 +66,13 @@ class Verdict:
         return f"{line}, {how}: {self.check.because}"
 
 
+def margin(check: Check, measured: float) -> float:
+    """Return how far inside its nearest bound the measured value is; negative outside, or nan."""
+    below = math.inf if check.below is None else float(check.below) - measured
+    above = math.inf if check.above is None else measured - float(check.above)
+    return math.nan if math.isnan(measured) else min(below, above)
+
+
 def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
     """Refuse checks of signals that a log with these topics will not have.
 

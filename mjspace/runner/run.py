@@ -17,7 +17,7 @@ from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start
 from mjspace.simulation.loop import fly
-from mjspace.simulation.recording import shapes
+from mjspace.simulation.recording import Block, shapes
 
 Progress = Callable[[float], None]
 """A function that is called with the simulated time reached [s]."""
@@ -114,10 +114,7 @@ def fly_to_log(
     with on_signals() as stop, Recorder(assembly) as recorder:
         blocks = stop.breaking_off(fly(assembly, start, [member], stop=stop))
         first = next(blocks)
-        checks, topics = assembly.scenario.checks, shapes(first)
-        refuse_unknown(checks, topics)
-        units = units_of(assembly, first.kinds)
-        refuse_other_dimensions(checks, assembly.scenario.events, topics, units)
+        refuse_unjudgeable(assembly, first)
         make_folder(path.parent)
         if force:
             remove(path)
@@ -139,3 +136,15 @@ def fly_to_log(
         for verdict in verdicts:
             recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
     return Result(path, verdicts, trouble, stop.signal, ended_by)
+
+
+def refuse_unjudgeable(assembly: Assembly, first: Block) -> None:
+    """Refuse checks that a flight with this ``first`` block cannot be judged by.
+
+    Raises:
+        InputError: a check names no signal of it, or has a bound of another dimension.
+    """
+    checks, topics = assembly.scenario.checks, shapes(first)
+    refuse_unknown(checks, topics)
+    units = units_of(assembly, first.kinds)
+    refuse_other_dimensions(checks, assembly.scenario.events, topics, units)

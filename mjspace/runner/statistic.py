@@ -32,7 +32,9 @@ class Statistic:
         if check.statistic in ("peak", "drift") or self._target is not None:
             values = np.abs(values)
         self.count += len(values)
-        self._total += float(np.sum(values**2 if check.statistic == "rms" else values))
+        # One after the other, so that the sum does not depend on how a flight is cut into blocks.
+        terms = values**2 if check.statistic == "rms" else values
+        self._total = float(np.add.accumulate(np.concatenate([[self._total], terms]))[-1])
         # max and min pass NaN on, which must fail every bound
         self._peak = float(np.max([self._peak, values.max()]))
         self._least = float(np.min([self._least, values.min()]))

@@ -48,8 +48,11 @@ def warm_up(module: str) -> None:
 def each(
     calls: Sequence[tuple[Callable[..., _Result], Any]],
     stop: Stop | None = None,
+    processes: int | None = None,
 ) -> Generator[tuple[int, _Result], None, None]:
     """Make ``calls``, functions with their argument; yield (index, result) as they are done.
+
+    There are as many ``processes`` as cores, where it is left out.
 
     Once ``stop`` is requested no other call begins, and those under way get SIGTERM: flights end
     with their log whole, and are yielded too. They get it as well when this generator is closed,
@@ -60,7 +63,7 @@ def each(
     """
     stop = stop or Stop()
     warm_up(calls[0][0].__module__)
-    cores = min(os.cpu_count() or 1, len(calls))
+    cores = min(processes or os.cpu_count() or 1, len(calls))
     theirs, ours = _CONTEXT.Pipe(duplex=False)
     with ours, ProcessPoolExecutor(cores, _CONTEXT, _begin, (theirs,)) as pool:
         due: dict[Future[Any], int] = {}

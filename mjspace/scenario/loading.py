@@ -30,21 +30,41 @@ def load(scenario: str | Path, overrides: Iterable[str] = ()) -> tuple[Scenario,
     Raises:
         InputError: no such scenario, no TOML, or a key that is wrong; one line.
     """
+    table, path, origins = read(scenario, overrides)
+    return validated(table, str(path), origins), path.parent
+
+
+def read(
+    scenario: str | Path, overrides: Iterable[str] = ()
+) -> tuple[dict[str, Any], Path, dict[str, str]]:
+    """Return the scenario's table with the overrides, unvalidated, its file, and what set each key.
+
+    Raises:
+        InputError: no such scenario, no TOML, or an override that is none.
+    """
     path = files.find(str(scenario))
     table = files.read(path)
-    origins = keys.apply(table, overrides)
+    return table, path, keys.apply(table, overrides)
+
+
+def validated(table: dict[str, Any], where: str, origins: Mapping[str, str] = {}) -> Scenario:
+    """Return the scenario that a ``table`` holds as it was ``read``, as ``load`` does.
+
+    Raises:
+        InputError: one line with all that is wrong.
+    """
     cut = {"cut_short": "duration" in origins}
-    found = validate(table, str(path), origins, context=cut)
+    found = validate(table, where, origins, context=cut)
     late = [check for check in found.checks if check.begins_too_late(found.duration)]
     if late:
         names = ", ".join(repr(check.name) for check in late)
         warnings.warn(
             f"checks that begin after the flight's end, {found.duration:g} s, left out: {names}",
-            stacklevel=2,
+            stacklevel=3,
         )
         kept = [check for check in found.checks if check not in late]
         found = found.model_copy(update={"checks": kept})
-    return found, path.parent
+    return found
 
 
 def validate(

@@ -18,6 +18,7 @@ from pydantic import (
 from mjspace.contract import TICK
 from mjspace.ranges import numbers
 from mjspace.scenario.declared import DeclaredIn
+from mjspace.scenario.dispersions import Dispersion, refuse_overlaps
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import Count, FileName, KindName, Positive, Si, Switch, Table, Time
 from mjspace.scenario.log_rates import LogRates
@@ -181,6 +182,12 @@ class Scenario(Table):
     checks: list[Check] = []
     events: list[EventTable] = []
     log: LogRates = LogRates()
+    dispersions: list[Dispersion] = []
+    """What differs from member to member of ``mjspace campaign``; every other command flies the
+    scenario as it stands."""
+    sampling: Literal["random", "latin_hypercube", "sobol"] = "random"
+    """How a campaign covers what its dispersions span. With ``latin_hypercube`` the draws depend on
+    the number of members too."""
 
     @model_validator(mode="before")
     @classmethod
@@ -200,6 +207,11 @@ class Scenario(Table):
                 name = getattr(check, key)
                 if name is not None and name not in names:
                     raise ValueError(f"checks.{number}.{key}: no event {name!r} in events: {names}")
+        return self
+
+    @model_validator(mode="after")
+    def _each_dispersed_once(self) -> "Scenario":
+        refuse_overlaps(self.dispersions)
         return self
 
     @model_validator(mode="after")

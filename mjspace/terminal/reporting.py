@@ -49,6 +49,33 @@ def progress_bar(
 
 
 @contextmanager
+def count_bar(total: int, doing: str) -> Iterator[Callable[[int, int], None]]:
+    """Yield a function to call with how many of ``total`` are done, and have failed, so far.
+
+    The bar is that of ``progress_bar``, with the rate of what this process does.
+    """
+    from tqdm import tqdm
+
+    layout = "{desc} {percentage:3.0f}% |{bar}| {n}/{total} {rate_fmt}{postfix} [{remaining}]"
+    bar = tqdm(
+        total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout, unit=""
+    )
+
+    def update(done: int, failed: int) -> None:
+        with suppress(OSError):
+            if not bar.n:
+                bar.initial = done  # what is there already counts for no rate
+            bar.set_postfix_str(f"{failed} failed", refresh=False)
+            bar.update(done - bar.n)
+
+    try:
+        yield update
+    finally:
+        with suppress(OSError):
+            bar.close()
+
+
+@contextmanager
 def cause_shown(requested: bool) -> Iterator[None]:
     """Print the traceback of an error's cause, if ``requested``, before the error is re-raised."""
     try:

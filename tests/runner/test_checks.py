@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from mjspace.errors import InputError
 from mjspace.runner.checks import Judge, Verdict, refuse_other_dimensions, refuse_unknown
+from mjspace.runner.statistic import Statistic
 from mjspace.scenario.scenario import Check, EventTable
 from mjspace.signals import by_topic, find_signal
 from mjspace.units import Unit
@@ -306,3 +307,18 @@ def test_a_matrix_is_its_numbers_row_by_row(signal: str, part: tuple[int, int]) 
 def test_a_topic_has_each_of_its_fields_once() -> None:
     fields = [("/truth", "rate"), ("/law", "e"), ("/truth", "rate"), ("/truth", "attitude")]
     assert by_topic(fields) == {"/truth": ["rate", "attitude"], "/law": ["e"]}
+
+
+@pytest.mark.parametrize("statistic", ["mean", "rms"])
+def test_a_statistic_is_the_same_bits_however_the_flight_is_cut(statistic: str) -> None:
+    """A campaign's table must not depend on the wall time by which blocks end."""
+    values = np.random.default_rng(5).normal(size=(1000, 1))
+    found = set()
+    for parts in (1, 2, 7, 300):
+        gathered = Statistic(Check(name="x", signal="truth.error", below=1.0, statistic=statistic))
+        for part in np.array_split(values, parts):
+            gathered.add(part)
+        found.add(gathered.value())
+    assert len(found) == 1
+    expected = values.mean() if statistic == "mean" else np.sqrt(np.mean(values**2))
+    assert found.pop() == pytest.approx(expected, rel=1e-12)

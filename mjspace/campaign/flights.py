@@ -1,0 +1,175 @@
+"""Flying some members of a campaign, in a batch where they differ in where they start alone."""
+
+import json
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjspace.campaign.members import Campaign, Population, population
+from mjspace.errors import FlightError, InputError
+from mjspace.interrupts import Interrupted
+from mjspace.runner.checks import Judge, Verdict
+from mjspace.runner.output import LOG
+from mjspace.runner.run import fly_to_log, refuse_unjudgeable
+from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.initial_state import Start, initial_physics, start_at
+from mjspace.simulation.loop import fly
+from mjspace.simulation.recording import one_vehicle, shapes
+
+STARTS = {
+    f"initial.{key}"
+    for key in ("attitude", "euler", "rate", "position", "velocity", "wheel_speed", "momentum")
+}
+"""What may differ within a batch."""
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What one member drew, and how it went."""
+
+    member: int
+    draws: list[Any]
+    verdicts: list[Verdict]
+    trouble: str
+    """Why it ended early; empty for a flight that reached its end."""
+    seconds: float
+    """Of wall time; of a batch its share."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it reached its end and every check came out as expected."""
+        return not self.trouble and all(verdict.as_expected for verdict in self.verdicts)
+
+
+@dataclass(frozen=True)
+class Call:
+    """Members that a worker process flies."""
+
+    campaign: Campaign
+    identity: dict[str, Any]
+    members: tuple[int, ...]
+    keep: str
+    """The logs that are kept: of ``failures``, of ``all`` or of ``none``."""
+    out: Path
+
+
+def log_of(out: Path, member: int) -> Path:
+    """Return where the member's log is in the folder of its campaign."""
+    return out / "logs" / f"{member:06d}" / LOG
+
+
+def fly_members(call: Call) -> list[Flown]:
+    """Fly the members, and keep the logs that are to be kept.
+
+    Raises:
+        InputError: the scenario does not admit what a member drew, or its files have changed.
+        FlightError: a draw did not arrive in the flight; or a member alone is not as in a batch.
+        OSError: a log cannot be written.
+    """
+    members = _same(call.campaign, json.dumps(call.identity))
+    if together(members):
+        flown = _batch(members, call.members)
+    else:
+        flown = [_alone(members, number) for number in call.members]
+    for one in flown:
+        if call.keep == "all" or (call.keep == "failures" and not one.passed):
+            _keep_log(members, one, log_of(call.out, one.member))
+    return flown
+
+
+@lru_cache(maxsize=1)
+def _same(campaign: Campaign, identity: str) -> Population:
+    """Return the members, once for the calls of a process, if they are those that began.
+
+    Raises:
+        InputError: the files have changed since.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # shown where the campaign began
+        members = population(campaign)
+    if json.dumps(members.identity) != identity:
+        raise InputError(f"{members.path}: the scenario, or its law, changed during the campaign")
+    return members
+
+
+def together(members: Population) -> bool:
+    """Return whether the members may fly in one batch: only their initial states differ.
+
+    In gravity an engine's first thrust depends on the place.
+    """
+    keys = {each.key.partition("[")[0] for each in members.dispersions}
+    at_place = members.scenario.environment.gravity is not None and "initial.position" in keys
+    return keys <= STARTS and not at_place
+
+
+def _alone(members: Population, number: int) -> Flown:
+    began = time.perf_counter()
+    assembly, draws = members.member(number)
+    start = start_at(assembly, initial_physics(assembly, 1), [number])
+    (verdicts,), trouble = _judged(assembly, start, [number])
+    return Flown(number, draws, verdicts, trouble, time.perf_counter() - began)
+
+
+def _batch(members: Population, numbers: Sequence[int]) -> list[Flown]:
+    """Fly the members in one batch; where one has to end early, again in two halves."""
+    began = time.perf_counter()
+    draws, physics = [], []
+    for number in numbers:
+        assembly, drawn = members.member(number)
+        draws.append(drawn)
+        physics.append(initial_physics(assembly, 1))
+    # Nothing but these rows differs, so that the last member's assembly does for all.
+    start = start_at(assembly, np.concatenate(physics), numbers)
+    verdicts, trouble = _judged(assembly, start, numbers)
+    if trouble and len(numbers) > 1:
+        half = len(numbers) // 2
+        return _batch(members, numbers[:half]) + _batch(members, numbers[half:])
+    share = (time.perf_counter() - began) / len(numbers)
+    return [
+        Flown(number, drawn, judged, trouble, share)
+        for number, drawn, judged in zip(numbers, draws, verdicts, strict=True)
+    ]
+
+
+def _judged(
+    assembly: Assembly, start: Start, members: Sequence[int]
+) -> tuple[list[list[Verdict]], str]:
+    """Return the verdicts of each member, and why the flight ended early."""
+    judges: list[Judge] = []
+    trouble = ""
+    scenario = assembly.scenario
+    try:
+        for block in fly(assembly, start, members):
+            if not judges:
+                refuse_unjudgeable(assembly, block)
+                topics = shapes(block)
+                judges = [Judge(scenario.checks, scenario.events, topics) for _ in members]
+            for vehicle, judge in enumerate(judges):
+                judge.add(block.time, one_vehicle(block, vehicle))
+    except FlightError as error:
+        trouble = str(error)
+    return [judge.verdicts() for judge in judges] or [[] for _ in members], trouble
+
+
+def _keep_log(members: Population, flown: Flown, path: Path) -> None:
+    """Fly a member once more, into a log, and see that it is as it was."""
+    assembly, _ = members.member(flown.member)
+    try:
+        result = fly_to_log(assembly, path, member=flown.member, force=True)
+    except FlightError:  # it could not even begin, and there is nothing to log
+        return
+    if result.signal:
+        path.unlink()
+        raise Interrupted(result.signal)
+    lines = [[verdict.line for verdict in each.verdicts] for each in (result, flown)]
+    if lines[0] != lines[1] or result.trouble != flown.trouble:
+        raise FlightError(
+            f"member {flown.member} is not twice the same: {result.trouble or lines[0]}, and "
+            f"before {flown.trouble or lines[1]}: has its law a memory of its own?"
+        )

@@ -1,0 +1,233 @@
+"""A campaign's members: the scenario with what each has drawn, and proof that it arrived."""
+
+import copy
+import hashlib
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjspace.campaign import draws
+from mjspace.errors import FlightError, InputError, input_error_at, nearest
+from mjspace.scenario.construct import plain
+from mjspace.scenario.dispersions import Dispersion, refuse_mode_outside
+from mjspace.scenario.loading import read, to_toml, validated
+from mjspace.scenario.scenario import Scenario
+from mjspace.simulation.assembly import Assembly, assemble
+
+STATE = {
+    "initial.position": ("qpos", slice(0, 3)),
+    "initial.attitude": ("qpos", slice(3, 7)),
+    "initial.velocity": ("qvel", slice(0, 3)),
+    "initial.rate": ("qvel", slice(3, 6)),
+}
+"""Where the bus's initial state stands in an assembly."""
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is flown: a scenario, ``count`` members of it, and the ``seed`` of all of them."""
+
+    scenario: str
+    """Its name or path."""
+    overrides: tuple[str, ...]
+    """As ``--set`` takes them."""
+    count: int
+    seed: int | None = None
+    """The scenario's own when left out."""
+    trust: bool = False
+
+    @property
+    def all_overrides(self) -> tuple[str, ...]:
+        """The overrides with the seed's."""
+        return self.overrides if self.seed is None else (*self.overrides, f"seed={self.seed}")
+
+
+@dataclass(frozen=True)
+class Population:
+    """The members of a campaign, of which none is built before it is needed."""
+
+    campaign: Campaign
+    table: Mapping[str, Any]
+    """The scenario as it is written, with the overrides."""
+    path: Path
+    """Of its file."""
+    origins: Mapping[str, str]
+    """The option that set each overridden key."""
+    nominal: Assembly
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario without draws, as flown."""
+        return self.nominal.scenario
+
+    @property
+    def dispersions(self) -> list[Dispersion]:
+        """What differs from member to member."""
+        return self.scenario.dispersions
+
+    @cached_property
+    def own_values(self) -> list[Any]:
+        """The scenario's own value of each dispersed key."""
+        return [value_at(self._written, each.path) for each in self.dispersions]
+
+    @cached_property
+    def _written(self) -> Any:
+        return plain(self.scenario.model_dump(mode="python"))
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """What makes two campaigns the same, but for the number of members."""
+        sources = {n: hashlib.sha256(c).hexdigest() for n, c in self.nominal.sources.items()}
+        return {"scenario": to_toml(self.scenario), "sources": sources}
+
+    def drawn(self, members: Sequence[int]) -> list[list[Any]]:
+        """Return the value of each dispersion of each of the members."""
+        found = self.scenario
+        rows = draws.uniforms(
+            found.sampling, found.seed, members, self.campaign.count, self.dispersions
+        )
+        return [draws.values(self.dispersions, self.own_values, row) for row in rows]
+
+    def member(self, number: int) -> tuple[Assembly, list[Any]]:
+        """Return the member's assembly, and its draws.
+
+        Raises:
+            InputError: the scenario does not admit what was drawn.
+            FlightError: a draw did not arrive in what is to fly.
+        """
+        (drawn,) = self.drawn([number])
+        table = copy.deepcopy(dict(self.table))
+        table.pop("dispersions", None)
+        for dispersion, value in zip(self.dispersions, drawn, strict=True):
+            put(table, self._written, dispersion.path, _with_unit(dispersion, value))
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the scenario's own have been shown
+                scenario = validated(table, str(self.path), self.origins)
+                assembly = assemble(scenario, self.path.parent, trust=self.campaign.trust)
+        except InputError as error:
+            raise InputError(f"member {number} of the campaign: {error}") from error
+        for dispersion, value in zip(self.dispersions, drawn, strict=True):
+            require_arrival(assembly, dispersion, value, number)
+        return assembly, drawn
+
+
+def population(campaign: Campaign) -> Population:
+    """Return the members of the campaign; its files are read.
+
+    Raises:
+        InputError: bad input, in one line.
+    """
+    table, path, origins = read(campaign.scenario, campaign.all_overrides)
+    scenario = validated(table, str(path), origins)
+    nominal = assemble(scenario, path.parent, trust=campaign.trust)
+    if not (scenario.dispersions or scenario.faults or nominal.sensors([0]).ticks):
+        raise InputError(f"{path}: dispersions: none, and no noise: every member would be alike")
+    found = Population(campaign, table, path, origins, nominal)
+    for number, dispersion in enumerate(scenario.dispersions):
+        with input_error_at(f"{path}: dispersions.{number}.key"):
+            _refuse_unfit(dispersion, value_at(found._written, dispersion.path))
+    return found
+
+
+def value_at(table: Any, path: Sequence[str]) -> Any:
+    """Return what stands at the path in a scenario with every default written out.
+
+    Raises:
+        ValueError: nothing does, with the names that are near.
+    """
+    place = table
+    for number, part in enumerate(path):
+        if isinstance(place, list) and part.isdigit() and int(part) < len(place):
+            place = place[int(part)]
+        elif isinstance(place, Mapping) and part in place:
+            place = place[part]
+        else:
+            where = ".".join(path[:number]) or "the scenario"
+            have = place if isinstance(place, Mapping) else map(str, range(_length(place)))
+            raise ValueError(f"{'.'.join(path)}: no {part!r} in {where}{nearest(part, have)}")
+    return place
+
+
+def put(table: Any, written: Any, path: Sequence[str], value: Any) -> None:
+    """Set the value at the path of a scenario's ``table``.
+
+    A list that the table leaves out, or gives as one number for all, is taken from the scenario
+    with every default ``written`` out.
+    """
+    *parents, last = path
+    place, known = table, written
+    for part in parents:
+        at = int(part) if isinstance(place, list) else part
+        known = known[at]
+        if isinstance(known, list) and not isinstance(_at(place, at), list):
+            place[at] = copy.deepcopy(known)
+        elif isinstance(place, dict):
+            place.setdefault(part, {})
+        place = place[at]
+    place[int(last) if isinstance(place, list) else last] = value
+
+
+def require_arrival(assembly: Assembly, dispersion: Dispersion, drawn: Any, member: int) -> None:
+    """Read the value back from what is to fly, and refuse another than was drawn.
+
+    Raises:
+        FlightError: with the key and both values.
+    """
+    flown = value_at(plain(assembly.scenario.model_dump(mode="python")), dispersion.path)
+    period = _unit(dispersion) == "Hz" and flown == 1.0 / drawn
+    arrived = flown == drawn or period
+    name, _, index = dispersion.key.partition("[")
+    if arrived and name in STATE:
+        where, part = STATE[name]
+        flown = getattr(assembly, where)[part]
+        flown = float(flown[int(index[:-1])]) if index else flown.tolist()
+        # A quaternion is normalized.
+        arrived = bool(np.allclose(flown, drawn, rtol=1e-3 * ("attitude" in name), atol=0.0))
+    if not arrived:
+        raise FlightError(
+            f"dispersion {dispersion.key} did not arrive: member {member} drew {drawn}, and would "
+            f"fly with {flown}"
+        )
+
+
+def _refuse_unfit(dispersion: Dispersion, own: Any) -> None:
+    """Refuse a distribution that the scenario's own value of the key does not go with."""
+    if dispersion.distribution in draws.WIDTH:
+        size = 4 if dispersion.distribution == "random_attitude" else 3
+        if not (own is None or (isinstance(own, list) and len(own) == size)):
+            raise ValueError(f"{dispersion.key} is {own!r}, should be {size} numbers")
+        return
+    if own is not None and (isinstance(own, bool) or not isinstance(own, int | float)):
+        raise ValueError(f"{dispersion.key} is {own!r}, should be a number: give an index, [0]")
+    takes = {"normal": "mean", "triangular": "mode"}.get(dispersion.distribution)
+    if takes and own is None and getattr(dispersion, takes) is None:
+        raise ValueError(f"{dispersion.key} has no value of its own: give {takes}")
+    refuse_mode_outside(dispersion, own if dispersion.mode is None else dispersion.mode)
+
+
+def _with_unit(dispersion: Dispersion, drawn: Any) -> Any:
+    """Return a draw as the scenario reads it: with the unit, which it judges, if it has one."""
+    unit = _unit(dispersion)
+    if not unit:
+        return drawn
+    each = drawn if isinstance(drawn, list) else [drawn]
+    texts = [f"{float(number)!r} {unit}" for number in each]
+    return texts if isinstance(drawn, list) else texts[0]
+
+
+def _unit(dispersion: Dispersion) -> str:
+    return next((each.unit for each in dispersion.quantities), "")
+
+
+def _at(place: Any, at: Any) -> Any:
+    return place.get(at) if isinstance(place, dict) else place[at]
+
+
+def _length(place: Any) -> int:
+    return len(place) if isinstance(place, list) else 0

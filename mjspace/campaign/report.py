@@ -1,0 +1,227 @@
+"""The answer of a campaign, as a table for a person or as plain data for another program."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from mjspace.campaign.flights import log_of
+from mjspace.campaign.statistics import CONFIDENCE, Gate, Rate, Spread, rank_correlation, spread
+from mjspace.campaign.store import WALL_TIME, Store
+from mjspace.contract import Array
+from mjspace.errors import printable
+from mjspace.scenario.scenario import Check
+
+REQUIRED = (0.9, 0.99, 0.999)
+"""Rates for which is said how many members are missing, where no gate names one."""
+WORST = 5
+
+
+@dataclass(frozen=True)
+class CheckFigures:
+    """What a check showed over all members."""
+
+    name: str
+    bound: str
+    failed: int
+    """Members whose check came out otherwise than expected."""
+    measured: Spread | None
+    correlations: dict[str, float | None]
+    """Spearman's, of each number drawn with the margin."""
+
+
+@dataclass(frozen=True)
+class Worst:
+    """One of the members with the least margins."""
+
+    member: int
+    passed: bool
+    why: str
+    """Its trouble, or its worst check."""
+    log: str
+    """Empty where none was kept."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How often the scenario works."""
+
+    rate: Rate
+    interval: tuple[float, float]
+    needed: dict[float, int | None]
+    """For each required rate how many members are still missing; None: at this rate no number."""
+    confidence: float
+    troubled: int
+    """Members that ended early."""
+    checks: list[CheckFigures]
+    worst: list[Worst]
+    seconds: float
+    """Of wall time, of all flights together."""
+    gate: Gate | None
+    folder: Path
+
+    @property
+    def passed(self) -> bool:
+        """Whether the gate is met; without one, whether every member succeeded."""
+        if self.gate is not None:
+            return self.gate.admits(self.rate)
+        return self.rate.successes == self.rate.members > 0
+
+
+def answer(store: Store, gate: Gate | None) -> Answer:
+    """Return what the members flown so far show; a column at a time is in memory."""
+    passed = store.column("passed")
+    rate = Rate(int(passed.sum()), len(passed))
+    confidence = CONFIDENCE if gate is None else gate.confidence
+    required = REQUIRED if gate is None else (gate.required,)
+    trouble = np.array([bool(t) for t in store.read(["trouble"])["trouble"].to_pylist()], bool)
+    least, checks = np.where(trouble, -np.inf, np.inf), []
+    names = np.full(len(passed), -1)
+    for number, (name, check) in enumerate(store.checks.items()):
+        margins = store.column(f"{name}: margin")
+        relative = _relative(check, margins)
+        outcomes = store.read([f"{name}: verdict"])[f"{name}: verdict"].to_pylist()
+        wrong = np.array([outcome != check.expected for outcome in outcomes], dtype=bool)
+        lower = relative < least
+        least, names = np.where(lower, relative, least), np.where(lower, number, names)
+        correlations = {d: rank_correlation(store.column(d), margins) for d in store.draws}
+        measured = spread(store.column(f"{name}: measured"))
+        checks.append(CheckFigures(name, _bound(check), int(wrong.sum()), measured, correlations))
+    order, members = np.lexsort((least, passed))[:WORST], store.column("member")
+    return Answer(
+        rate,
+        rate.interval(confidence),
+        {each: rate.needed(each, confidence) for each in required},
+        confidence,
+        int(trouble.sum()),
+        checks,
+        [_worst(store, int(members[i]), int(names[i])) for i in order],
+        float(store.column(WALL_TIME).sum()),
+        gate,
+        store.folder,
+    )
+
+
+def _relative(check: Check, margins: Array) -> Array:
+    """Return margins over the size of the bound, to compare checks: half the width of two bounds.
+
+    What was expected to fail is worst where it holds; what was not measured is worst of all.
+    """
+    bounds = [float(b) for b in (check.below, check.above) if b is not None]
+    size = abs(bounds[0]) if len(bounds) == 1 else (bounds[0] - bounds[1]) / 2.0
+    sign = 1.0 if check.expected == "PASS" else -1.0
+    return np.where(np.isnan(margins), -np.inf, sign * margins / (size or 1.0))
+
+
+def _worst(store: Store, member: int, check: int) -> Worst:
+    row = store.row(member)
+    why = row["trouble"]
+    if not why and check >= 0:
+        name = list(store.checks)[check]
+        measured = row[f"{name}: measured"]
+        value = "not measured" if measured is None else f"{measured:.4g}"
+        why = f"{name}: {value} (required {_bound(store.checks[name])})"
+    log = log_of(store.folder, member)
+    return Worst(member, row["passed"], why, str(log) if log.is_file() else "")
+
+
+def _bound(check: Check) -> str:
+    bounds = (("<", check.below), (">", check.above))
+    return " and ".join(f"{sign} {bound:.4g}" for sign, bound in bounds if bound is not None)
+
+
+def data(found: Answer) -> dict[str, Any]:
+    """Return the answer as ``--json`` prints it."""
+    return {
+        "passed": found.passed,
+        "gate": None if found.gate is None else str(found.gate),
+        "members": found.rate.members,
+        "successes": found.rate.successes,
+        "rate": None if math.isnan(found.rate.value) else found.rate.value,
+        "interval": list(found.interval),
+        "at_least": found.rate.at_least(found.confidence),
+        "confidence": found.confidence,
+        "needed": [{"rate": rate, "members": more} for rate, more in found.needed.items()],
+        "ended_early": found.troubled,
+        "checks": [dataclasses.asdict(check) for check in found.checks],
+        "worst": [dataclasses.asdict(worst) for worst in found.worst],
+        "out": str(found.folder),
+    }
+
+
+def show(found: Answer) -> None:
+    """Print the answer."""
+    console = Console(highlight=False)
+    rate, (low, high) = found.rate, found.interval
+    percent = f"{100.0 * found.confidence:g} %"
+    console.print(
+        f"{rate.successes} of {rate.members} succeed: {rate.value:.4g}, "
+        f"{percent} interval {low:.4g} to {high:.4g}"
+        + (f"; {found.troubled} ended early" if found.troubled else "")
+    )
+    for required, more in found.needed.items():
+        shown = f"at least {required:g} with {percent} confidence"
+        if more == 0:
+            console.print(f"  {shown}: shown")
+        elif more is None:
+            console.print(f"  {shown}: not at this rate")
+        else:
+            console.print(f"  {shown}: {more} more members at this rate")
+    _show_checks(console, found)
+    _show_correlations(console, found)
+    table = _table("worst", ">member", "verdict", "why", "log")
+    for each in found.worst:
+        verdict = "[green]PASS[/]" if each.passed else "[bold red]FAIL[/]"
+        log = str(Path(each.log).relative_to(found.folder)) if each.log else "-"
+        table.add_row("", str(each.member), verdict, _plain(each.why), log)
+    console.print(table)
+    if found.gate is not None:
+        word = "[green]met[/]" if found.passed else "[bold red]not met[/]"
+        bound = rate.at_least(found.confidence)
+        console.print(f"gate {found.gate}: {word}, at least {bound:.6g} is shown")
+
+
+def _show_checks(console: Console, found: Answer) -> None:
+    titles = (">failed", ">min", ">5 %", ">median", ">95 %", ">max")
+    table = _table(">", "check", *titles)
+    for number, check in enumerate(found.checks, 1):
+        spread = check.measured
+        values = dataclasses.astuple(spread) if spread else ()
+        cells = [f"{value:.3g}" for value in values] or ["-"] * 5
+        name = _plain(f"{check.name} {check.bound}")
+        table.add_row(str(number), name, str(check.failed), *cells)
+    console.print(table)
+
+
+def _show_correlations(console: Console, found: Answer) -> None:
+    draws = list(found.checks[0].correlations) if found.checks else []
+    if not draws:
+        return
+    numbers = [f">{number}" for number in range(1, len(found.checks) + 1)]
+    table = _table("rank correlation with the margin of check", *numbers)
+    for draw in draws:
+        cells = [check.correlations[draw] for check in found.checks]
+        table.add_row(_plain(draw), *("-" if c is None else f"{c:+.2f}" for c in cells))
+    console.print(table)
+
+
+def _table(*titles: str) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for title in titles:
+        is_number = title.startswith(">")
+        table.add_column(
+            title.lstrip(">"),
+            justify="right" if is_number else "left",
+            no_wrap=is_number or title == "log",
+        )
+    return table
+
+
+def _plain(text: str) -> str:
+    return escape(printable(text))

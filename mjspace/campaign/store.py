@@ -1,0 +1,226 @@
+"""A campaign's folder: what it flies, and a Parquet file for each block of members."""
+
+import json
+import math
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjspace.campaign.flights import Flown
+from mjspace.campaign.members import Population
+from mjspace.contract import Array
+from mjspace.errors import InputError
+from mjspace.log import lock
+from mjspace.log.provenance import software
+from mjspace.runner.checks import NO_CRASH, Verdict, margin
+from mjspace.runner.output import make_folder
+from mjspace.scenario.scenario import Check
+
+DESCRIPTION = "campaign.json"
+WALL_TIME = "wall_time"
+"""The one column that differs from flight to flight."""
+
+
+def draw_columns(members: Population) -> list[str]:
+    """Return the name of the column of each number drawn."""
+    found: list[str] = []
+    for dispersion in members.dispersions:
+        count = {"random_attitude": 4, "on_sphere": 3}.get(dispersion.distribution)
+        key = dispersion.key
+        found += [key] if count is None else [f"{key}[{i}]" for i in range(count)]
+    return found
+
+
+def checks_of(members: Population) -> dict[str, Check]:
+    """Return the checks of each flight, by names that are made unique."""
+    scenario = members.scenario
+    checks = list(scenario.checks)
+    if scenario.plant.ground is not None and all(c.signal != NO_CRASH.signal for c in checks):
+        checks.append(NO_CRASH)
+    found: dict[str, Check] = {}
+    for check in checks:
+        number = sum(check.name == other.name for other in found.values())
+        found[f"{check.name} ({number + 1})" if number else check.name] = check
+    return found
+
+
+class Store:
+    """The folder of one campaign."""
+
+    def __init__(self, folder: Path, members: Population) -> None:
+        """Name the ``folder``; nothing is read or written.
+
+        Raises:
+            InputError: Parquet's library is not installed.
+        """
+        try:
+            import pyarrow
+            import pyarrow.parquet
+        except ImportError:
+            raise InputError("a campaign needs pyarrow: pip install 'mjspace[data]'") from None
+        self._arrow: Any = pyarrow
+        self.folder, self._blocks = folder, folder / "members"
+        self.draws, self.checks = draw_columns(members), checks_of(members)
+        self._members = members
+        kinds = {"member": pyarrow.int64(), "seed": pyarrow.int64(), "passed": pyarrow.bool_()}
+        kinds |= dict.fromkeys(self.draws, pyarrow.float64())
+        for name in self.checks:
+            kinds[f"{name}: measured"] = kinds[f"{name}: margin"] = pyarrow.float64()
+            kinds[f"{name}: verdict"] = pyarrow.string()
+        kinds |= {"trouble": pyarrow.string(), WALL_TIME: pyarrow.float64()}
+        self._schema = pyarrow.schema(list(kinds.items()))
+
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Make the folder this campaign's alone, for as long as the context lasts.
+
+        Raises:
+            InputError: another campaign, or anything else, is in it; or another process has it.
+            OSError: it cannot be written.
+        """
+        description = self.folder / DESCRIPTION
+        here = self.folder.is_dir() and any(self.folder.iterdir())
+        if here and not description.is_file():
+            raise InputError(f"{self.folder}: holds something else: give another folder by --out")
+        if here and self._files():  # else nothing is lost with what was tried before
+            self._refuse_another(description)
+        make_folder(self._blocks)
+        with (self.folder / "lock").open("ab") as file:
+            if not lock.lock(file.fileno()):
+                raise InputError(f"{self.folder}: another process flies this campaign")
+            for left in self._blocks.glob("*.part"):
+                left.unlink()
+            unfinished = description.with_suffix(".part")
+            unfinished.write_text(json.dumps(self._description(), indent=2))
+            os.replace(unfinished, description)
+            yield
+
+    def _description(self) -> dict[str, Any]:
+        members = self._members
+        return {
+            "name": members.scenario.name,
+            "seed": members.scenario.seed,
+            "members": members.campaign.count,
+            **members.identity,
+            "software": software(),
+        }
+
+    def _refuse_another(self, description: Path) -> None:
+        """Refuse to go on with another campaign than the folder's."""
+        try:
+            old = json.loads(description.read_text())
+            count = int(old["members"])
+        except (ValueError, TypeError, KeyError):
+            raise InputError(f"{description}: is no description of a campaign") from None
+        new, hint = self._description(), "give another folder by --out"
+        for key in ("name", "seed", "scenario", "sources", "software"):
+            if old.get(key) != new[key]:
+                what = f"{key} {old.get(key)}, not {new[key]}"
+                if key == "scenario":
+                    what = f"another scenario: {_first_difference(str(old[key]), new[key])}"
+                elif key in ("sources", "software"):
+                    what = f"other {key}: {_differing(old.get(key), new[key])}"
+                raise InputError(f"{self.folder}: holds a campaign of {what}: {hint}")
+        if new["members"] < count:
+            raise InputError(f"{self.folder}: holds {count} members: --n {count} or more goes on")
+        if new["members"] != count and self._members.scenario.sampling == "latin_hypercube":
+            raise InputError(
+                f"{self.folder}: holds a Latin hypercube of {count} members, which cannot grow: "
+                f"--n {count}, or {hint}"
+            )
+
+    def finished(self) -> set[int]:
+        """Return the members that have been flown."""
+        found: set[int] = set()
+        for path in self._files():
+            found |= set(self._table(path, ["member"])["member"].to_pylist())
+        return found
+
+    def write(self, flown: Sequence[Flown]) -> None:
+        """Write a block of members, as a whole or not at all.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        rows = [self._row(one) for one in flown]
+        table = self._arrow.Table.from_pylist(rows, schema=self._schema)
+        name = f"{flown[0].member:08d}-{flown[-1].member:08d}.parquet"
+        unfinished = self._blocks / f"{name}.part"
+        self._arrow.parquet.write_table(table, unfinished)
+        os.replace(unfinished, self._blocks / name)
+
+    def _row(self, flown: Flown) -> dict[str, Any]:
+        numbers = [x for each in flown.draws for x in (each if isinstance(each, list) else [each])]
+        row: dict[str, Any] = {
+            "member": flown.member,
+            "seed": self._members.scenario.seed,
+            "passed": flown.passed,
+            **{name: float(x) for name, x in zip(self.draws, numbers, strict=True)},
+            "trouble": flown.trouble,
+            WALL_TIME: flown.seconds,
+        }
+        verdicts = flown.verdicts or [Verdict(c, math.nan) for c in self.checks.values()]
+        for name, verdict in zip(self.checks, verdicts, strict=True):
+            row[f"{name}: measured"] = _number(verdict.measured)
+            row[f"{name}: margin"] = _number(margin(verdict.check, verdict.measured))
+            row[f"{name}: verdict"] = verdict.outcome
+        return row
+
+    def read(self, columns: Sequence[str] | None = None) -> Any:
+        """Return the table of all members flown, or these columns of it, in their order."""
+        chosen = None if columns is None else list(dict.fromkeys(["member", *columns]))
+        tables = [self._table(path, chosen) for path in self._files()]
+        if not tables:
+            return self._schema.empty_table()
+        return self._arrow.concat_tables(tables).sort_by("member").combine_chunks()
+
+    def column(self, name: str) -> Array:
+        """Return a column of numbers, nan where there is none."""
+        found: Array = np.array(self.read([name])[name].to_numpy(zero_copy_only=False), dtype=float)
+        return found
+
+    def row(self, member: int) -> dict[str, Any]:
+        """Return all that the table has of a member.
+
+        Raises:
+            KeyError: it has not been flown.
+        """
+        for path in self._files():
+            first, last = map(int, path.stem.split("-"))
+            if first <= member <= last:
+                found: dict[str, Any] = (
+                    self._table(path, None).slice(member - first, 1).to_pylist()[0]
+                )
+                return found
+        raise KeyError(member)
+
+    def _files(self) -> list[Path]:
+        return sorted(self._blocks.glob("*.parquet"))
+
+    def _table(self, path: Path, columns: list[str] | None) -> Any:
+        try:
+            return self._arrow.parquet.read_table(path, columns=columns)
+        except self._arrow.ArrowInvalid as error:
+            raise InputError(f"{path}: {error}: remove it, and its members fly again") from error
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _first_difference(old: str, new: str) -> str:
+    """Return the first lines that differ."""
+    for one, other in zip(old.splitlines(), new.splitlines(), strict=False):
+        if one != other:
+            return f"{re.sub(' +', ' ', one)}, not {re.sub(' +', ' ', other)}"
+    return "one is longer"
+
+
+def _differing(old: Any, new: dict[str, str]) -> str:
+    old = old if isinstance(old, dict) else {}
+    return ", ".join(k for k in {**old, **new} if old.get(k) != new.get(k))

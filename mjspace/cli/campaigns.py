@@ -1,0 +1,100 @@
+"""The command ``mjspace campaign``: a scenario flown many times, and how often it works."""
+
+import json
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mjspace.errors import InputError
+from mjspace.terminal.options import Force, Json, Set, Traceback, Trust
+from mjspace.terminal.reporting import cause_shown, count_bar, progress_bar
+
+if TYPE_CHECKING:
+    from mjspace.campaign.members import Campaign
+
+
+class Keep(StrEnum):
+    """Whose logs are kept."""
+
+    failures = "failures"
+    all = "all"
+    none = "none"
+
+
+def campaign(
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    count: Annotated[int, typer.Option("--n", help="Members: flights of the campaign.")] = 100,
+    overrides: Set = [],  # noqa: B006
+    seed: Annotated[int | None, typer.Option(help="Seed of every draw and sensor.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Folder of the results, where the same command goes on; "
+            "runs/<scenario>/campaign-seed-<seed> when left out.",
+        ),
+    ] = None,
+    keep: Annotated[Keep, typer.Option(help="Whose logs are kept.")] = Keep.failures,
+    gate: Annotated[
+        str, typer.Option(help="'success >= 0.99 @ 0.95': rate and confidence; exit status 1 else.")
+    ] = "",
+    member: Annotated[
+        int | None, typer.Option(help="Fly this member alone, into a log, and judge it.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+    trust: Trust = False,
+    traceback: Traceback = False,
+) -> None:
+    """Fly a scenario many times with its dispersions: how often does it work?"""
+    from mjspace.campaign import campaign as flown
+    from mjspace.campaign import report, statistics
+    from mjspace.campaign.members import Campaign
+
+    if count < 1:
+        raise InputError(f"--n {count}: should be 1 or more")
+    if force and member is None:
+        raise InputError("--force: replaces the log of a --member; a campaign replaces nothing")
+    required = statistics.gate(gate) if gate else None
+    what = Campaign(scenario, tuple(overrides), count, seed, trust)
+    folder = flown.folder_of(what, out)
+    if member is not None:
+        _one(what, folder, member, force, as_json, traceback)
+    with cause_shown(traceback), count_bar(count, "flying") as told:
+        flight = flown.fly(what, folder, keep=keep.value, processes=workers, told=told)
+    found = report.answer(flight.store, required)
+    if as_json:
+        print(json.dumps(report.data(found), indent=2))
+    else:
+        report.show(found)
+        print(f"table  {folder / 'members'}")
+    if flight.signal:
+        done = f"{found.rate.members} of {count} flown; the same command goes on"
+        print(f"mjspace: interrupted: {done}", file=sys.stderr)
+        raise typer.Exit(128 + flight.signal)
+    raise typer.Exit(0 if found.passed else 1)
+
+
+def _one(
+    what: "Campaign", folder: Path, member: int, force: bool, as_json: bool, traceback: bool
+) -> None:
+    """Fly one member, print its verdict and exit."""
+    from mjspace.campaign import campaign as flown
+    from mjspace.campaign.members import population
+    from mjspace.runner import report
+
+    duration = population(what).scenario.duration
+    with cause_shown(traceback), progress_bar(duration, "flying") as progress:
+        result = flown.fly_one(what, folder, member, force=force, progress=progress)
+    if as_json:
+        print(json.dumps(report.result_data(result), indent=2))
+    else:
+        report.print_result(result)
+        print(f"log    {result.path}")
+    raise typer.Exit(128 + result.signal if result.signal else not result.passed)
