@@ -108,6 +108,8 @@ class Whole(Data):
     """Hinges whose angle and rate are measured."""
     command: dict[str, Field]
     """Fields of a law's command."""
+    beside: list[str]
+    """Other free bodies, which fly beside it as spacecraft without a law."""
 
 
 class Inspection(Data):
@@ -297,6 +299,10 @@ def _whole(vehicle: Vehicle) -> Whole:
         ],
         gimbals=list(own.gimbals),
         command=takes,
+        beside=[
+            model.body(model.jnt_bodyid[joint]).name
+            for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[1:]
+        ],
     )
 
 

@@ -37,6 +37,8 @@ def _show_vehicle(console: Console, vehicle: Whole) -> None:
     say = partial(console.print, highlight=False, soft_wrap=True, markup=False)
     centre = _numbers(vehicle.center_of_mass)
     say(f"vehicle: bus {vehicle.bus!r}, {vehicle.mass:.6g} kg, centre of mass {centre} m")
+    if vehicle.beside:
+        say(f"other spacecraft: {', '.join(vehicle.beside)}")
     if vehicle.wheels:
         wheels = table_of("reaction wheel", "hinge", "axis", "inertia [kg m^2]", "torque [N m]")
         for wheel in vehicle.wheels:
