@@ -28,6 +28,8 @@ PAGES = [
     if re.search(r"^```(python|console)", page.read_text(), re.M)
     if page.name != "extending.md"  # each of its recipes has a test of its own
 ]
+LONG_PAGES = {"docs/lander.md", "docs/rendering.md"}
+"""Those that take most of a minute."""
 TEXTS = [
     path
     for pattern in ("*.md", "docs/*.md", "assets/**/*.md", "benchmarks/*.md")
@@ -70,7 +72,9 @@ def put(language: str, path: Path, text: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize(
+    "page", [pytest.param(p, marks=[pytest.mark.long] * (p in LONG_PAGES)) for p in PAGES]
+)
 def test_everything_on_the_page_works(
     page: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:

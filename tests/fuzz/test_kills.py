@@ -26,6 +26,6 @@ def test_a_signal_at_any_instant_loses_nothing_else(kill: Kill) -> None:
 
 @pytest.mark.slow
 def test_many_signals_lose_nothing_else() -> None:
-    for name, kill in islice(kills.cases(15), 30):
+    for name, kill in islice(kills.cases(15), 15):
         found = kills.attempt(kill, **BUSY)
         assert not found.trouble, f"{name}: {found.trouble}"

@@ -37,7 +37,7 @@ def test_it_moves_as_the_equations_say() -> None:
     np.testing.assert_allclose(truth["rate"][-1, 0], state[7:10], atol=1e-11)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_its_targets_are_those_of_the_equations() -> None:
     scenario, _ = load("dgvscmg-free")
     attitude, rate = (np.array(check.target) for check in scenario.checks[:2])
