@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from processes import in_session
+from processes import in_session, left_in_session
 
 from mjspace.errors import FlightError
 from mjspace.interrupts import Stop
@@ -75,10 +75,7 @@ def test_no_process_outlives_its_parent(number: signal.Signals) -> None:
         assert len(in_session(parent.pid)) > 2
         parent.send_signal(number)
         parent.stdout.read()  # until nobody holds it any more
-    due = time.monotonic() + 10.0
-    while (left := in_session(parent.pid)) and time.monotonic() < due:
-        time.sleep(0.05)
-    assert not left
+    assert not left_in_session(parent.pid)
 
 
 @pytest.mark.slow
@@ -101,6 +98,6 @@ def test_interrupted_flights_of_all_are_reported_with_their_logs_whole(tmp_path:
     assert going.returncode == 130
     assert "interrupted by signal 15" in out
     assert err.splitlines()[-1].startswith("mjspace: interrupted: ")
-    assert not in_session(going.pid)
+    assert not left_in_session(going.pid)
     for log in tmp_path.glob("all/*/flight.mcap"):
         assert Log(log).complete
