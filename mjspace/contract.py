@@ -1,13 +1,13 @@
 """What passes between a vehicle, its sensors, a reference and a control law."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, field, fields
 from typing import Annotated, Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjspace.ranges import Form, Range, refuse_unfit
+from mjspace.ranges import Gains as Gains
+from mjspace.ranges import gain as gain
 from mjspace.units import Unit as Unit
 
 Array = NDArray[np.float64]
@@ -291,60 +291,3 @@ class ReferenceSource(Protocol):
         Any named tuple is valid that begins with the fields of ``Reference``: the law receives its
         rows, and the log has its fields.
         """
-
-
-class Gains:
-    """Base of a law or a reference that refuses unfit gains however it is constructed.
-
-    Constructed in Python, a gain may have a leading axis more: one for each vehicle of a batch.
-    A dataclass with a ``__post_init__`` of its own begins it with ``super().__post_init__()``.
-    Without this base the gains are checked by the scenario's loader alone.
-    """
-
-    def __post_init__(self) -> None:
-        """Check the declared gains; ValueError for one that does not fit."""
-        declared: tuple[Any, ...] = fields(self)  # type: ignore[arg-type]
-        refuse_unfit(
-            {f.name: getattr(self, f.name) for f in declared},
-            {f.name: f.metadata for f in declared},
-            of_each_vehicle=True,
-        )
-
-
-def gain(
-    unit: str | None = "",
-    shape: tuple[int | str | None, ...] = (),
-    default: Any = MISSING,
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    below: float | None = None,
-    at_most: float | None = None,
-    whole: bool = False,
-    form: Form = "",
-    one_for_all: bool = False,
-) -> Any:
-    """Declare a law's or a reference's parameter: its SI unit, array shape and range.
-
-    Where the unit depends on another gain, as that of a bound on a signal, it is None: a quantity
-    of any dimension is converted. In ``shape``, None is any length, and a name is a length that all
-    gains with that name share: ``("wheel", 3)`` and ``("wheel",)``. Every number has to be finite
-    and within ``above`` or ``at_least`` and ``below`` or ``at_most``; ``at_most=inf`` admits
-    infinity, for a limit that may be absent. ``whole`` admits whole numbers only. ``form`` is what
-    the array has to be as a whole: an "inertia" (symmetric, positive definite), or rows that are
-    each a "direction" (not zero), a "unit vector" or a "quaternion" (of norm 1 to 1e-3), or
-    "increasing" values. ``one_for_all`` admits a single number in place of the array.
-
-    The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
-    constructed in Python. A gain without a default that is named as a fact of the plant is
-    (``inertia``, ``wheel_axes``, ``wheel_inertia``, ``control_period``, ``inner_period``, and those
-    of servos and arms, as ``mjspace law-header`` lists them) may be left out: it is then that fact.
-    """
-    limits = Range(above, at_least, below, at_most, whole)
-    metadata: dict[str, Any] = {"unit": unit, "shape": shape, "range": limits, "form": form}
-    metadata["one_for_all"] = one_for_all
-    if default is MISSING:
-        return field(metadata=metadata)
-    if shape and not one_for_all:
-        return field(metadata=metadata, default_factory=lambda: np.array(default, dtype=float))
-    return field(metadata=metadata, default=default)

@@ -1,7 +1,7 @@
-"""The numbers that a declared parameter admits: a range for each, a form for the whole array."""
+"""Declared parameters: a unit, a shape and a range for each number, a form for the whole array."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
@@ -185,3 +185,60 @@ FORMS: dict[str, Callable[[_Array], str]] = {
     "increasing": _increasing,
 }
 """By form, a function that says what is wrong with an array; empty text if nothing is."""
+
+
+class Gains:
+    """Base of a law or a reference that refuses unfit gains however it is constructed.
+
+    Constructed in Python, a gain may have a leading axis more: one for each vehicle of a batch.
+    A dataclass with a ``__post_init__`` of its own begins it with ``super().__post_init__()``.
+    Without this base the gains are checked by the scenario's loader alone.
+    """
+
+    def __post_init__(self) -> None:
+        """Check the declared gains; ValueError for one that does not fit."""
+        declared: tuple[Any, ...] = fields(self)  # type: ignore[arg-type]
+        refuse_unfit(
+            {f.name: getattr(self, f.name) for f in declared},
+            {f.name: f.metadata for f in declared},
+            of_each_vehicle=True,
+        )
+
+
+def gain(
+    unit: str | None = "",
+    shape: tuple[int | str | None, ...] = (),
+    default: Any = MISSING,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = None,
+    whole: bool = False,
+    form: Form = "",
+    one_for_all: bool = False,
+) -> Any:
+    """Declare a law's or a reference's parameter: its SI unit, array shape and range.
+
+    Where the unit depends on another gain, as that of a bound on a signal, it is None: a quantity
+    of any dimension is converted. In ``shape``, None is any length, and a name is a length that all
+    gains with that name share: ``("wheel", 3)`` and ``("wheel",)``. Every number has to be finite
+    and within ``above`` or ``at_least`` and ``below`` or ``at_most``; ``at_most=inf`` admits
+    infinity, for a limit that may be absent. ``whole`` admits whole numbers only. ``form`` is what
+    the array has to be as a whole: an "inertia" (symmetric, positive definite), or rows that are
+    each a "direction" (not zero), a "unit vector" or a "quaternion" (of norm 1 to 1e-3), or
+    "increasing" values. ``one_for_all`` admits a single number in place of the array.
+
+    The scenario's loader refuses what does not fit, and ``Gains`` does so for a law that is
+    constructed in Python. A gain without a default that is named as a fact of the plant is
+    (``inertia``, ``wheel_axes``, ``wheel_inertia``, ``control_period``, ``inner_period``, and those
+    of servos and arms, as ``mjspace law-header`` lists them) may be left out: it is then that fact.
+    """
+    limits = Range(above, at_least, below, at_most, whole)
+    metadata: dict[str, Any] = {"unit": unit, "shape": shape, "range": limits, "form": form}
+    metadata["one_for_all"] = one_for_all
+    if default is MISSING:
+        return field(metadata=metadata)
+    if shape and not one_for_all:
+        return field(metadata=metadata, default_factory=lambda: np.array(default, dtype=float))
+    return field(metadata=metadata, default=default)
