@@ -16,6 +16,7 @@ from mjspace.campaign.members import Population
 from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.log import lock
+from mjspace.log.arrow import pyarrow_for
 from mjspace.log.provenance import software
 from mjspace.runner.checks import NO_CRASH, Verdict, margin
 from mjspace.runner.output import make_folder
@@ -58,12 +59,7 @@ class Store:
         Raises:
             InputError: Parquet's library is not installed.
         """
-        try:
-            import pyarrow
-            import pyarrow.parquet
-        except ImportError:
-            raise InputError("a campaign needs pyarrow: pip install 'mjspace[data]'") from None
-        self._arrow: Any = pyarrow
+        self._arrow = pyarrow = pyarrow_for("a campaign")
         self.folder, self._blocks = folder, folder / "members"
         self.draws, self.checks = draw_columns(members), checks_of(members)
         self._members = members

@@ -102,7 +102,7 @@ def compare(
     one, two = Log.of(first), Log.of(second)
     chosen = select(one, signals, topics)
     of_topics = {each.topic for each in chosen}
-    others = [] if signals else [each for each in select(two) if each.topic in of_topics]
+    others = [] if signals else [s for s in select(two) if not topics or s.topic in of_topics]
     common = [each for each in chosen if _shape(two, each) == _shape(one, each)]
     found = [SignalDifference(each.name, _unit(one, each)) for each in common]
     fields = by_topic((each.topic, each.field) for each in common)

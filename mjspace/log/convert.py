@@ -9,7 +9,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from mjspace.errors import InputError, whole_or_none
+from mjspace.errors import whole_or_none
+from mjspace.log.arrow import pyarrow_for
 from mjspace.log.columns import Signal, blocks, select, stride, table
 from mjspace.log.reader import Log
 
@@ -67,11 +68,7 @@ def _csv(log: Log, file: BinaryIO, chosen: list[Signal], every: int, progress: P
 def _parquet(
     log: Log, file: BinaryIO, chosen: list[Signal], every: int, progress: Progress
 ) -> None:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise InputError("Parquet needs pyarrow: pip install 'mjspace[data]'") from None
+    pyarrow = pyarrow_for("Parquet")
     units = {"time": "s"} | {
         column: log.units[signal.topic].get(signal.field, "")
         for signal in chosen

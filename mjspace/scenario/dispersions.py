@@ -63,14 +63,7 @@ class Dispersion(Table):
     def _a_key(cls, key: str) -> str:
         if re.fullmatch(r"[^\s.\[\]=]+(\.[^\s.\[\]=]+|\[\d+\])*", key) is None:
             raise ValueError(f"got {key!r}, should be as 'plant.mass' or 'initial.rate[0]'")
-        if re.split(r"[.\[]", key)[0] in (
-            "checks",
-            "dispersions",
-            "events",
-            "log",
-            "seed",
-            "sampling",
-        ):
+        if re.split(r"[.\[]", key)[0] in _NOT_FLOWN:
             raise ValueError(f"{key!r} is no part of the flight")
         return key
 

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mjspace.errors import shortened
 
@@ -32,20 +32,13 @@ def progress_bar(
     A bar is drawn after two seconds, where the output is a terminal. A terminal that is closed
     draws none, and stops nothing.
     """
-    from tqdm import tqdm
+    with _bar(total, doing, count + "[{elapsed}<{remaining}]") as bar:
 
-    layout = "{desc} {percentage:3.0f}% |{bar}| " + count + "[{elapsed}<{remaining}]"
-    bar = tqdm(total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout)
+        def update(reached: float) -> None:
+            with suppress(OSError):
+                bar.update(reached - bar.n)
 
-    def update(reached: float) -> None:
-        with suppress(OSError):
-            bar.update(reached - bar.n)
-
-    try:
         yield update
-    finally:
-        with suppress(OSError):
-            bar.close()
 
 
 @contextmanager
@@ -54,22 +47,29 @@ def count_bar(total: int, doing: str) -> Iterator[Callable[[int, int], None]]:
 
     The bar is that of ``progress_bar``, with the rate of what this process does.
     """
+    with _bar(total, doing, "{n}/{total} {rate_fmt}{postfix} [{remaining}]") as bar:
+
+        def update(done: int, failed: int) -> None:
+            with suppress(OSError):
+                if not bar.n:
+                    bar.initial = done  # what is there already counts for no rate
+                bar.set_postfix_str(f"{failed} failed", refresh=False)
+                bar.update(done - bar.n)
+
+        yield update
+
+
+@contextmanager
+def _bar(total: float, doing: str, figures: str) -> Iterator[Any]:
+    """Yield a bar with the ``figures`` beside it."""
     from tqdm import tqdm
 
-    layout = "{desc} {percentage:3.0f}% |{bar}| {n}/{total} {rate_fmt}{postfix} [{remaining}]"
+    layout = "{desc} {percentage:3.0f}% |{bar}| " + figures
     bar = tqdm(
         total=total, desc=doing, delay=2, disable=None, leave=False, bar_format=layout, unit=""
     )
-
-    def update(done: int, failed: int) -> None:
-        with suppress(OSError):
-            if not bar.n:
-                bar.initial = done  # what is there already counts for no rate
-            bar.set_postfix_str(f"{failed} failed", refresh=False)
-            bar.update(done - bar.n)
-
     try:
-        yield update
+        yield bar
     finally:
         with suppress(OSError):
             bar.close()

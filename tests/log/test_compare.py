@@ -57,6 +57,9 @@ def test_what_one_log_alone_has_is_told(logs: tuple[Log, Log], tmp_path: Path) -
     found = compare(logs[0], coast)
     assert [name for name in found.only_first if name.startswith("law.")]
     assert not any("law." in each.name for each in found.signals)
+    other_way = compare(coast, logs[0])
+    assert (other_way.only_first, other_way.only_second) == (found.only_second, found.only_first)
+    assert not compare(coast, logs[0], topics=["truth"]).only_second
 
 
 def test_numbers_that_are_none_differ_from_others_and_not_from_themselves() -> None:
