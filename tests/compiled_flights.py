@@ -15,6 +15,7 @@ from mjspace.simulation import compiled_blocks
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start
 from mjspace.simulation.loop import fly
+from mjspace.simulation.stepper import Stepper
 from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
 
 SHORT_BLOCKS = [
@@ -100,9 +101,30 @@ def one_of(start: Start, vehicle: int) -> Start:
     def part(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         return {name: values[vehicle : vehicle + 1] for name, values in arrays.items()}
 
+    law = start.law
+    if law:
+        law = type(law)(*(values[vehicle : vehicle + 1] for values in law))
     return dataclasses.replace(
         start,
+        law=law,
         physics=start.physics[vehicle : vehicle + 1],
         sensors=part(start.sensors),
         actuators=part(start.actuators),
     )
+
+
+def start_of_row(built: Assembly, flight: Flown, row: int) -> Start:
+    """Return the state that a flight has logged in that row as a start."""
+    logged: dict[str, dict[str, np.ndarray]] = {"sensor": {}, "actuator": {}, "law": {}}
+    for topic, values in flight.rows.items():
+        kind, _, field = topic.removeprefix("/state.").partition("_")
+        if topic.startswith("/state.") and kind in logged:
+            logged[kind][field] = values[row]
+    reference = built.reference.at(np.zeros(1))
+    law = built.law.reset(
+        Stepper(built, first_start(built, [0])).sense(0).measurement,
+        type(reference)(*(a[0] for a in reference)),
+    )
+    state = type(law)(*(logged["law"][field] for field in law._fields)) if law else ()
+    physics = flight.rows["/state.physics"][row]
+    return Start(row, physics, logged["sensor"], state, logged["actuator"])

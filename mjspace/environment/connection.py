@@ -196,16 +196,20 @@ class Closing(Table):
 
 
 class Springs(Table):
-    """Springs between the two ports, compressed until the connection opens; they are not fixed."""
+    """Springs between the two ports, compressed until the connection opens.
+
+    They push and never pull: none is fastened to the other spacecraft.
+    """
 
     stiffness: Annotated[Each, Si("N/m")]
     """Of all, or of each."""
     stroke: Annotated[Each, Si("m")]
-    """By which each is compressed, along the docking axis; it pushes no farther."""
+    """By which each is compressed while the ports touch, along the vehicle's docking axis; it
+    pushes no farther."""
     positions: list[Annotated[list[float], Field(min_length=3, max_length=3), Si("m")]] = [
         [0.0, 0.0, 0.0]
     ]
-    """Of their feet, in the ports' axes, one row for each spring."""
+    """Of their feet from the ports, in the ports' axes, one row for each spring."""
 
     @model_validator(mode="after")
     def _one_for_each(self) -> Self:
@@ -237,10 +241,12 @@ class Connection(Table):
     opens_at: Annotated[NonNegative, Si("s")] | None = None
     """When it opens, for good; never when left out."""
     frequency: Annotated[Positive, Si("Hz")] = 1.0
-    """Of the two spacecraft on the closed latch, about which the modes of such unlike bodies lie:
-    its stiffness is 1/3 (2 pi f)^2 of the trace of the reduced mass, and of the reduced inertia."""
+    """At which the two spacecraft swing on the closed latch. Its stiffness is (2 pi f)^2 / a along
+    all three axes, with a the acceleration of one port relative to the other for one newton between
+    them, the mean of the axes; likewise in rotation. Where a differs from axis to axis, so do the
+    frequencies, to either side of f."""
     damping_ratio: NonNegative = 0.7
-    """Of those modes."""
+    """Of that swing; 1 returns without swinging over."""
     springs: Springs | None = None
     """None when left out."""
 

@@ -5,40 +5,38 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mjspace.actuators.actuator_set import ActuatorSet
-from mjspace.contract import Array, Event
+from mjspace.contract import Array
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 
 class BurningMass(StepEffect):
-    """Gives bodies the masses that actuators' propellant has in the middle of each step."""
+    """Gives bodies the masses that actuators' propellant has in the middle of each step.
+
+    At a control instant they have those of the instant, for what is observed then.
+    """
 
     name: ClassVar[str] = "the burning mass"
     every_step: ClassVar[bool] = True
     not_compiled = ""
 
     @classmethod
-    def of(cls, actuators: ActuatorSet, *, observed: bool) -> Self | None:
-        """Return the effect for ``actuators``; None where none of them burns anything.
-
-        ``observed`` is whether anything is computed of the masses at control instants.
-        """
+    def of(cls, actuators: ActuatorSet) -> Self | None:
+        """Return the effect for ``actuators``; None where none of them burns anything."""
         state = actuators.reset(1)
-        return cls(actuators, observed=observed) if actuators.masses(state, state) else None
+        return cls(actuators) if actuators.masses(state, state) else None
 
-    def __init__(self, actuators: ActuatorSet, *, observed: bool) -> None:
+    def __init__(self, actuators: ActuatorSet) -> None:
         """Keep the ``actuators`` that know what burns."""
-        self._actuators, self._observed = actuators, observed
+        self._actuators = actuators
         self._batch: Any = None
 
     def bind(self, batch: Any) -> None:
         """Take the batch whose model's fields change."""
         self._batch = batch
 
-    def observe(self, memory: State, physics: Array, time: float, events: list[Event]) -> State:
-        """Set the masses of the control instant, where they are observed."""
-        if self._observed:
-            self._set(memory, memory)
-        return memory
+    def weigh(self, memory: State) -> None:
+        """Set the masses of a control instant."""
+        self._set(memory, memory)
 
     def before_step(self, memory: State, instant: Instant) -> State:
         """Set the masses of the middle of the step."""
@@ -59,5 +57,5 @@ class BurningMass(StepEffect):
             self._batch.set_const()
 
     def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
-        """Return the masses and inertias in the middle of the step."""
+        """Return the masses and inertias in the middle of the step from ``before`` to ``after``."""
         return self._actuators.masses(before, after)

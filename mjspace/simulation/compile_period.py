@@ -166,6 +166,7 @@ class _Tracing(TracedArrays):
         prove(driving[0], self.program.memory)
         remembers = dict(zip(self.memory, remembered, strict=True))
         preparing, written, masses = self._preparing(remembers)
+        weighing, weighed = self._weighing()
         before = [Recorded("physics", "", self.physics)]
         before += [Recorded("memory", name, array) for name, array in self.memory.items()]
         before += recorded
@@ -174,6 +175,7 @@ class _Tracing(TracedArrays):
         changed = changes(self.law_state, inner) + changes(own, remembered)
         return PeriodProgram(
             program=self.program,
+            weighing=weighing,
             looking=self._looking(),
             sensing=sensing,
             driving=Section(driving[0], changed, np.zeros(0)),
@@ -193,6 +195,7 @@ class _Tracing(TracedArrays):
             applied=outputs,
             saturated=cut,
             written=written,
+            weighed=weighed,
             masses=masses,
             before=before,
             after=after,
@@ -223,6 +226,15 @@ class _Tracing(TracedArrays):
         memory = self.traced_arrays(self.memory)
         return self._report([effect.alarm(memory, topics) for effect in waiting])
 
+    def _weighing(self) -> tuple[Section, list[Write]]:
+        """Return what sets the masses of a control instant: a section, and what it writes."""
+        memory = self.traced_arrays(self.memory)
+        with self.program.section() as weighing:
+            seen = any(effect.looks for effect in self.effects)
+            weighed = self._masses(memory, memory) if seen else []
+        prove(weighing[0], self.program.memory)
+        return Section(weighing[0], [], np.zeros(0)), weighed
+
     def _looking(self) -> Section:
         """Return what step effects see."""
         own = tuple(self.memory.values())
@@ -248,7 +260,7 @@ class _Tracing(TracedArrays):
         """
         memory = self.traced_arrays(self.memory), self.traced_arrays(remembered)
         with self.program.section() as preparing:
-            written, masses, reports = list[Write](), list[Write](), []
+            written, reports = list[Write](), []
             for effect, known in zip(self.effects, self.known, strict=True):
                 writes, report = effect.prepare(
                     memory[1],
@@ -258,13 +270,17 @@ class _Tracing(TracedArrays):
                 )
                 written += self._own_numbers(writes)
                 reports.append(report)
-                of_bodies = effect.masses(*memory)
-                masses += self._own_numbers(
-                    Write(name, body * values.size, values) for name, body, values in of_bodies
-                )
+            masses = self._masses(*memory)
             told = self._report(reports)
         prove(preparing[0], self.program.memory)
         return Section(preparing[0], [], told), written, masses
+
+    def _masses(self, before: Any, after: Any) -> list[Write]:
+        """Return the masses and inertias for a step between what is remembered at its ends."""
+        of_bodies = [each for effect in self.effects for each in effect.masses(before, after)]
+        return self._own_numbers(
+            Write(name, body * values.size, values) for name, body, values in of_bodies
+        )
 
     def _own_numbers(self, writes: Iterable[Write]) -> list[Write]:
         """Return the writes with arrays that nothing else changes."""

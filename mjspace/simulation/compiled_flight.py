@@ -57,7 +57,6 @@ class CompiledFlight:
         self.physics = self._batch.state
         named = (period.memory, period.sensors, period.biases)
         remembered = [*(a for arrays in named for a in arrays.values()), *period.law]
-        remembered += [write.values for write in period.masses]
         places, size = _packed(remembered)
         self._rows = np.zeros((vehicles, size), np.uint8)
         views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
@@ -244,6 +243,7 @@ class CompiledFlight:
             ),
             "applied": self._writes(applied, words_of),
             "written": self._writes(period.written, words_of),
+            "weighed": self._writes(period.weighed, words_of_model),
             "masses": self._writes(period.masses, words_of_model),
             "before": self._record_table(period.before, self._record_places),
             "after": self._record_table(period.after, self._record_places[len(period.before) :]),
@@ -268,6 +268,7 @@ class CompiledFlight:
         looking = [effect for effect in self._effects if effect.looks]
         of_forces = any(effect.of_forces for effect in looking)
         orders["observe"] = address("mj_forward" if of_forces else "mj_step1")
+        orders["observes_forces"] = of_forces
         orders["looks"] = bool(looking)
         orders["looks_in_steps"] = any(effect.every_step for effect in looking)
         for name in ("looking", "sensing", "preparing"):
@@ -280,10 +281,10 @@ class CompiledFlight:
         """Return the tables of the program's sections, whose words follow one another."""
         period, tables = self._period, dict[str, np.ndarray]()
         words, relative, used = [], [], 0
-        for name in ("looking", "sensing", "driving", "preparing"):
+        for name in ("weighing", "looking", "sensing", "driving", "preparing"):
             calls, after, _ = getattr(period, name)
             tables[name] = calls.table + np.array([0, 0, used, used, used])
-            if name != "preparing":  # which leads to no other state
+            if name not in ("weighing", "preparing"):  # which lead to no other state
                 tables[f"after_{name}"] = self._copies(after)
             words.append(calls.words)
             relative.append(calls.relative)

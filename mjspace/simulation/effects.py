@@ -7,7 +7,7 @@ from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.burning_mass import BurningMass
 from mjspace.simulation.connections import Connections
 from mjspace.simulation.known_beforehand import KnownBeforehand
-from mjspace.simulation.model_sensors import ModelSensors, depend_on_masses
+from mjspace.simulation.model_sensors import ModelSensors
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.user_disturbance import UserDisturbance
 from mjspace.vehicle import deployments, ground_contact
@@ -22,11 +22,10 @@ def effects_of(
     scenario, model = assembly.scenario, assembly.vehicle.model
     sensors, around = assembly.vehicle.sensors, scenario.environment.gravity
     gravity = None if around is None else around.acceleration
-    burning = BurningMass.of(assembly.actuators, observed=depend_on_masses(sensors))
     every = (
         ground_contact.of(model, layout.struts, layout.velocity),
-        burning,
-        ModelSensors.of(model, sensors, gravity, burns=burning is not None),
+        BurningMass.of(assembly.actuators),
+        ModelSensors.of(model, sensors, gravity),
         Connections.of(assembly),
         ActuatorFaults.of(assembly, members),
         KnownBeforehand.of(assembly.known, scenario),

@@ -1,10 +1,10 @@
 """A scenario's vehicle, linearized about its initial state by central differences in MuJoCo.
 
 The states are errors from the nominal motion: ``position`` of the bus, inertial axes; ``attitude``,
-the rotation vector from the nominal to the true body axes, in body axes; angles of hinges; and
-their rates: ``velocity``, inertial axes, ``rate``, body axes, speeds of hinges; and activations of
-a model's own motors. The rows of A that are kinematics are exact, as attitude' = rate - w x
-attitude at the nominal rate w.
+the rotation vector from the nominal to the true body axes, in body axes; angles of hinges; the same
+of other spacecraft, ``target.position``; and their rates: ``velocity``, inertial axes, ``rate``,
+body axes, speeds of hinges; and activations of a model's own motors. The rows of A that are
+kinematics are exact.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,7 +16,6 @@ import mujoco
 import numpy as np
 
 from mjspace import attitude
-from mjspace.algebra import cross_matrix
 from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load
@@ -25,9 +24,8 @@ from mjspace.simulation.flight_software.interface import Field, Fields, interfac
 from mjspace.simulation.initial_state import INTEGRATION, initial_physics, start_at
 from mjspace.simulation.linear_inputs import inputs_of, names_of, refuse_bent
 from mjspace.simulation.linear_plant import LinearPlant
-from mjspace.simulation.state_layout import StateLayout
+from mjspace.simulation.linear_states import kinematics, states_of
 from mjspace.simulation.stepper import Stepper
-from mjspace.vehicle.vehicle import Vehicle
 
 _OF_HINGES = ("wheel_speed", "gimbal_angle", "gimbal_rate", "wheel_angle")
 _STEP = 1e-5
@@ -61,7 +59,7 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
     interface = interface_of(assembly)
     inputs = inputs_of(assembly, interface.command)
     model, vehicle = assembly.vehicle.model, assembly.vehicle
-    names, units = zip(*_states(vehicle), strict=True)
+    names, units = zip(*states_of(vehicle), strict=True)
     kept = [i for i, name in enumerate(names) if name]
     nominal = initial_physics(assembly, 1)[0]
     _refuse_dry_friction(model, assembly.qvel)
@@ -87,9 +85,6 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
     of_activations = derivatives[1 + 4 * model.nv : 1 + 2 * nx]
     refuse_bent(derivatives[:1], of_activations, names[2 * model.nv :])
     dynamics = slopes(derivatives)
-    kinematics = np.eye(model.nv, nx, model.nv)
-    rate = nominal[StateLayout(assembly).rate]
-    kinematics[3:6, 3:6] = -cross_matrix(rate)  # after the position of the free joint
     after = _after_a_period(assembly, physics, commands, interface.command)
     moves = slopes(np.array([_difference(model, after[0], row) for row in after]))
     measured = dict(_outputs(assembly, interface.measurement))
@@ -98,7 +93,7 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
     sensors = assembly.scenario.sensors
     noise = [np.full(prod(f.shape), _noise(sensors.get(name))) for name, f in measured.items()]
     return LinearPlant(
-        A=np.vstack([kinematics, dynamics[:, :nx]])[of_states],
+        A=np.vstack([kinematics(model, assembly.qvel, nx), dynamics[:, :nx]])[of_states],
         B=np.vstack([np.zeros((model.nv, nu)), dynamics[:, nx:]])[kept],
         C=slopes(outputs)[:, kept],
         D=np.zeros((outputs.shape[1], nu)),
@@ -115,45 +110,6 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
         output_units=np.array(list(_units(measured))),
         noise_std=np.concatenate(noise),
     )
-
-
-def _states(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
-    """Yield name and unit of each degree of freedom, and of its rate; "" for an angle left out.
-
-    That is a wheel's whose angle is not measured: nothing depends on it but imbalance.
-    """
-    model = vehicle.model
-    wheels, gimbals = list(vehicle.wheel_dof), list(vehicle.gimbal_dof)
-    encoded = [
-        int(model.jnt_dofadr[np.flatnonzero(model.jnt_qposadr == q)[0]]) for q in vehicle.wheel_qpos
-    ]
-
-    def hinge(dof: int) -> tuple[str, str]:
-        """Return the names of a hinge's angle and of its rate."""
-        name = model.joint(int(model.dof_jntid[dof])).name
-        if dof in wheels:
-            at = f"[{wheels.index(dof)}]"
-            return (f"wheel_angle{at}" if dof in encoded else "", f"wheel_speed{at}")
-        if dof in gimbals:
-            return f"gimbal_angle[{gimbals.index(dof)}]", f"gimbal_rate[{gimbals.index(dof)}]"
-        return f"{name}.position", f"{name}.velocity"
-
-    def slides(dof: int) -> bool:
-        return bool(model.jnt_type[model.dof_jntid[dof]] == mujoco.mjtJoint.mjJNT_SLIDE)
-
-    hinges = range(6, model.nv)
-    yield from ((f"position[{i}]", "m") for i in range(3))
-    yield from ((f"attitude[{i}]", "rad") for i in range(3))
-    yield from ((hinge(dof)[0], "m" if slides(dof) else "rad") for dof in hinges)
-    yield from ((f"velocity[{i}]", "m/s") for i in range(3))
-    yield from ((f"rate[{i}]", "rad/s") for i in range(3))
-    yield from ((hinge(dof)[1], "m/s" if slides(dof) else "rad/s") for dof in hinges)
-    for motor in range(model.nu):
-        count, name = int(model.actuator_actnum[motor]), model.actuator(motor).name
-        yield from (
-            (f"{name}.activation[{i}]" if count > 1 else f"{name}.activation", "")
-            for i in range(count)
-        )
 
 
 def _perturbed(model: Any, nominal: Array) -> tuple[Array, Array]:
@@ -193,8 +149,8 @@ def _stepper(
     members = [0] * len(physics)
     stepper = Stepper(assembly, start_at(assembly, physics, members), members)
     period = stepper.sense(0)
-    sizes = np.cumsum([prod(field.shape) for field in fields.values()])[:-1]
-    parts = np.split(commands, sizes, axis=1)
+    ends = np.cumsum([prod(field.shape) for field in fields.values()], dtype=int)
+    parts = np.split(commands, ends, axis=1)[:-1]
     shapes = [(len(physics), *field.shape) for field in fields.values()]
     arrays = [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
     period.law, period.signals = (), ()
@@ -260,10 +216,11 @@ def _refuse_dry_friction(model: Any, qvel: Array) -> None:
 
 def _outputs(assembly: Assembly, measurement: Fields) -> Iterator[tuple[str, Field]]:
     """Yield what depends on the motion at the instant alone, of what is measured."""
-    sensors, own = assembly.scenario.sensors, {s.field: s for s in assembly.vehicle.own.sensors}
+    sensors, own = assembly.scenario.sensors, {s.field: s for s in assembly.vehicle.sensors}
     for name, field in measurement.items():
-        if name in own:
-            of_motion, turns = not own[name].of_forces, own[name].is_attitude
+        if field.measures in own:
+            sensor = own[field.measures]
+            of_motion, turns = not sensor.of_forces, sensor.is_attitude
         else:
             of_sensor = name in sensors and not sensors[name].integrates
             of_motion, turns = of_sensor or name in _OF_HINGES, field.measures == "attitude"

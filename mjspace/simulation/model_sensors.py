@@ -21,23 +21,18 @@ from mjspace.vehicle.step_effect import State, StepEffect
 PREFIX = "model_sensor_"
 
 
-def depend_on_masses(sensors: Sequence[ModelSensor]) -> bool:
-    """Return whether what any of the ``sensors`` reads depends on the bodies' masses."""
-    return any(each.of_forces or each.kind.startswith("subtree") for each in sensors)
-
-
 @dataclass(eq=False, kw_only=True)
 class ModelSensors(StepEffect):
     """Reads them at each control instant into the truth, which then has a field for each."""
 
     name: ClassVar[str] = "the model's own sensors"
+    not_compiled = ""
     looks: ClassVar[bool] = True
 
     model: Any
     columns: dict[str, slice]
     """Of ``sensordata``, by the field."""
     of_forces: bool
-    not_compiled: str
     weights: tuple[SensedWeight, ...]
     """What gravity changes in those that feel it; none without gravity."""
     _batch: Any = field(init=False, repr=False, default=None)
@@ -49,24 +44,19 @@ class ModelSensors(StepEffect):
         model: Any,
         sensors: Sequence[ModelSensor],
         gravity: Callable[[Array], Array] | None,
-        *,
-        burns: bool,
     ) -> Self | None:
         """Return the effect for the ``sensors``; None without any.
 
-        ``gravity`` returns what acts on the vehicle [m/s^2], (..., 3), at positions [m], (..., 3);
-        ``burns`` is whether bodies lose mass in flight.
+        ``gravity`` returns what acts on the vehicle [m/s^2], (..., 3), at positions [m], (..., 3).
         """
         if not sensors:
             return None
         columns = {each.field: columns_of(model, each.name) for each in sensors}
         weights = () if gravity is None else tuple(weights_of(model, sensors, gravity))
-        reason = "they depend on masses that burn" if burns and depend_on_masses(sensors) else ""
         return cls(
             model=model,
             columns=columns,
             of_forces=any(each.of_forces for each in sensors),
-            not_compiled=reason,
             weights=weights,
         )
 

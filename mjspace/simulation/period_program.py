@@ -35,6 +35,8 @@ class PeriodProgram:
     """The program of one vehicle's control period; all arrays are views of its memory."""
 
     program: Program
+    weighing: Section
+    """Of a control instant: the masses that bodies have then, for what step effects see."""
     looking: Section
     """Of a control instant and of the end of each later step: what step effects see."""
     sensing: Section
@@ -73,8 +75,10 @@ class PeriodProgram:
     """1.0 for each motor that saturates, (1, motors)."""
     written: list[Write]
     """By step effects, into mjData."""
+    weighed: list[Write]
+    """At a control instant, into mjModel; none where no step effect looks."""
     masses: list[Write]
-    """Into mjModel."""
+    """For a step, into mjModel."""
     before: list[Recorded]
     """Recorded at the control instant."""
     after: list[Recorded]

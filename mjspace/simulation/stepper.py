@@ -8,7 +8,7 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from mjspace import attitude, interrupts
-from mjspace.contract import Array, Measurement
+from mjspace.contract import Array, Event, Measurement
 from mjspace.environment.install import install_callbacks
 from mjspace.errors import FlightError, InputError, failure
 from mjspace.interrupts import Interrupted
@@ -92,8 +92,7 @@ class Stepper:
         period.number, period.time = number, number * self._control
         period.physics = physics = self._copy_of_state()
         period.events, period.sensors = [], self.sensors
-        if self.effects:
-            self._each_effect("observe", physics, period.time, period.events)
+        self._observe(physics, period.time, period.events)
         period.memory, period.truth = self.memory, self._truth(physics)
         period.measurement = self._measure(number * self._steps, period.truth)
         return period
@@ -101,8 +100,7 @@ class Stepper:
     def observed(self, number: int) -> State:
         """Return what is remembered once the effects have observed the control instant of now."""
         before = self.memory
-        if self._hooks["observe"]:
-            self._each_effect("observe", self._copy_of_state(), number * self._control, [])
+        self._observe(self._copy_of_state(), number * self._control, [])
         observed, self.memory = self.memory, before
         return observed
 
@@ -229,6 +227,13 @@ class Stepper:
             for view, part in views:
                 view[:] = values[:, part]
         return applied, saturated
+
+    def _observe(self, physics: Array, now: float, events: list[Event]) -> None:
+        """Let the effects observe a control instant, with the masses of that instant."""
+        if self._hooks["observe"]:
+            for effect in self._hooks["weigh"]:
+                _of(effect, effect.weigh, self.memory)
+            self._each_effect("observe", physics, now, events)
 
     def _each_effect(self, hook: str, *arguments: Any, between: bool = False) -> None:
         """Call the ``hook`` of ``StepEffect`` that changes the memory alone on each effect.

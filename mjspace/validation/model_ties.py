@@ -8,6 +8,7 @@ import numpy as np
 
 _FREE = mujoco.mjtJoint.mjJNT_FREE
 _FEW = 6
+_GEOMS = (int(mujoco.mjtWrap.mjWRAP_SPHERE), int(mujoco.mjtWrap.mjWRAP_CYLINDER))
 _BODIES = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
 
 
@@ -150,7 +151,7 @@ def _anchored_tendons(model: Any) -> Iterator[int]:
             kind, thing = model.wrap_type[wrap], model.wrap_objid[wrap]
             if kind == mujoco.mjtWrap.mjWRAP_SITE:
                 body = model.site_bodyid[thing]
-            elif kind in (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER):
+            elif kind in _GEOMS:
                 body = model.geom_bodyid[thing]
             else:
                 continue

@@ -99,9 +99,11 @@ def _composed(table: PlantTable, source: ModelSource | None) -> Composed:
         for name, other in table.spacecraft.items():
             other.attach(spec, name, bus_of(spec))
     with input_error_at("plant.ports"):
-        other_spacecraft.add_ports(spec, table.ports, bus_of(spec))
+        other_spacecraft.add_ports(spec, table.ports, bus_of(spec), "plant.ports")
     others = other_spacecraft.names_of(spec)
-    relative = relative_motion.add_sensors(spec, bus_of(spec).name, others, table.connections)
+    relative = relative_motion.add_sensors(
+        spec, bus_of(spec).name, others, table.connections, [each.field for each in own.sensors]
+    )
     stops = any(hinge.stops for hinge in table.hinges.values())
     if stops:
         # The torques on a gimbal and on what carries it differ by the solver's remainder: at its

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import mujoco
 import numpy as np
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from mjspace.contract import Array
 from mjspace.errors import input_error_at, nearest
@@ -29,6 +29,8 @@ _Z_TO_X = np.array([0.5, 0.5, 0.5, 0.5])
 _FOIL, _CELLS, _DARK = [0.78, 0.66, 0.38, 1.0], [0.09, 0.12, 0.3, 1.0], [0.15, 0.15, 0.17, 1.0]
 _BEHIND = [-4.4, -3.4, 2.6]
 """Of the bus [m]: where the camera is that looks towards another spacecraft."""
+_ROUNDING = 1e-9
+"""Of the largest principal moment: by so much it may exceed the sum of the others, as a plate's."""
 
 
 class OtherSpacecraft(Table):
@@ -58,6 +60,21 @@ class OtherSpacecraft(Table):
     rate: Rate3 | None = None
     """Angular velocity at time zero, its own axes; none when left out."""
 
+    @field_validator("inertia")
+    @classmethod
+    def _possible(cls, inertia: Any) -> Any:
+        if inertia is None:
+            return inertia
+        moments = np.linalg.eigvalsh(np.array(inertia))
+        excess = moments[2] - moments[1] - moments[0]
+        if excess > _ROUNDING * moments[2]:
+            three = ", ".join(f"{moment:.4g}" for moment in moments)
+            raise ValueError(
+                f"no rigid body has the principal moments {three} kg m^2: the largest exceeds the "
+                f"sum of the others by {excess:.4g}"
+            )
+        return inertia
+
     @model_validator(mode="after")
     def _whole(self) -> "OtherSpacecraft":
         if (self.mass is None) != (self.inertia is None):
@@ -80,13 +97,16 @@ class OtherSpacecraft(Table):
         Raises:
             ValueError: the name is taken, or there is no such free body in the model.
         """
-        body = spec.body(name)
+        body, key = spec.body(name), f"plant.spacecraft.{name}"
         if self.mass is not None:
             if body is not None:
-                raise ValueError(f"{name}: the model has a body of that name: call it otherwise")
+                raise ValueError(f"{key}: the model has a body of that name: call it otherwise")
+            if spec.joint(name) is not None:
+                raise ValueError(f"{key}: the model has a joint of that name: call it otherwise")
             body = spec.worldbody.add_body(name=name)
             body.add_freejoint().name = name
             moments, iquat = mass_properties.principal(np.array(self.inertia))
+            moments[2] = min(moments[2], moments[0] + moments[1])  # of a plate, but for rounding
             body.mass, body.inertia, body.explicitinertial = self.mass, moments, True
             body.ipos, body.iquat = np.zeros(3), iquat  # without a place it has no axes either
             if self.size is None:
@@ -96,25 +116,28 @@ class OtherSpacecraft(Table):
         elif body is None or not any(joint.type == _FREE for joint in body.joints):
             free = [each.parent.name for each in spec.joints if each.type == _FREE][1:]
             has = f"{nearest(name, free)}" if free else ": the model has none beside the vehicle"
-            raise ValueError(f"{name}: give mass and inertia; no free body {name!r}{has}")
-        add_ports(spec, {f"{name}_{port}": at for port, at in self.ports.items()}, body)
+            raise ValueError(f"{key}: give mass and inertia; no free body {name!r}{has}")
+        add_ports(spec, self.ports, body, f"{key}.ports", f"{name}_")
         camera = bus.add_camera(name=f"towards_{name}", pos=_BEHIND, fovy=40.0, targetbody=name)
         camera.mode = mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY
 
 
-def add_ports(spec: Any, ports: dict[str, Port], bus: Any) -> None:
-    """Add a site for each of the ``ports``, by its name, to its body or else to the ``bus``.
+def add_ports(spec: Any, ports: dict[str, Port], bus: Any, key: str, prefix: str = "") -> None:
+    """Add a site for each of the ``ports``, to its body or else to the ``bus``.
+
+    Its name is the port's behind the ``prefix``; ``key`` is the table's in the scenario.
 
     Raises:
         ValueError: there is no such body, or the name of a site is taken.
     """
-    for name, port in ports.items():
+    for own_name, port in ports.items():
+        name, own_key = prefix + own_name, f"{key}.{own_name}"
         body = bus if port.body is None else spec.body(port.body)
         if body is None:
             have = [each.name for each in spec.bodies if each.name != "world"]
-            raise ValueError(f"ports: no body {port.body!r}{nearest(str(port.body), have)}")
+            raise ValueError(f"{own_key}: no body {port.body!r}{nearest(str(port.body), have)}")
         if spec.site(name) is not None:
-            raise ValueError(f"ports: the model has a site {name!r} already: call it otherwise")
+            raise ValueError(f"{own_key}: there is a site {name!r} already: call it otherwise")
         site = body.add_site(name=name, pos=port.position, group=4)
         mujoco.mju_euler2Quat(site.quat, np.array(port.euler), "XYZ")  # about fixed axes
         ring = _drawn(body, mujoco.mjtGeom.mjGEOM_CYLINDER, [port.radius, 0.2 * port.radius, 0.0])

@@ -62,8 +62,9 @@ class StepEffect(ABC):
     its own names, never changed in place; what it holds is logged in /state, under
     ``actuator_<name>``, and a replay starts from it. An effect remembers nothing elsewhere.
 
-    In a control period the order is: ``observe``; the sensors and the law; ``at_control``; then for
-    each integration step the actuators, ``change``, ``before_step``, MuJoCo, ``after_step``.
+    In a control period the order is: ``weigh``; ``observe``; the sensors and the law;
+    ``at_control``; then for each integration step the actuators, ``change``, ``before_step``,
+    MuJoCo, ``after_step``.
 
     Where an effect is compiled, its methods of array code (``look``, ``add_to_truth``, ``alarm``,
     ``change``, ``prepare``, ``masses``) are taken down. They stand for all that it does in each
@@ -98,6 +99,9 @@ class StepEffect(ABC):
     def reset(self, physics: Array) -> State:
         """Return what it remembers at the start of a flight, at ``physics`` (N, nstate)."""
         return {}
+
+    def weigh(self, memory: State) -> None:  # noqa: B027
+        """Set the masses of a control instant, before any effect observes it."""
 
     def observe(self, memory: State, physics: Array, time: float, events: list[Event]) -> State:
         """Return the memory at a control instant, before the truth is computed from it."""
@@ -175,7 +179,8 @@ class StepEffect(ABC):
     def masses(self, before: State, after: State) -> list[tuple[str, int, Array]]:
         """Return masses and inertias for the step that leads from ``before`` to ``after``.
 
-        Of a compiled effect: the field of MuJoCo's model, its body, and the values (N, ...).
+        Of a compiled effect: the field of MuJoCo's model, its body, and the values (N, ...). They
+        are those of a control instant where ``before`` and ``after`` are what is remembered then.
         """
         return []
 

@@ -186,6 +186,44 @@ def test_an_undamped_latch_keeps_energy_to_fourth_order() -> None:
     assert np.log2(drifts[0] / drifts[1]) > 3.7  # RK4's dissipation is of fifth order
 
 
+def test_springs_between_turning_bodies_keep_energy_to_fourth_order() -> None:
+    # Feet off the axes of ports that turn against each other: a force or a torque in another frame
+    # than the spring's would do work. They push all the while: their strokes are not spent.
+    feet = [[0.03, 0.2, -0.1], [-0.02, -0.15, 0.25]]
+    stiffness, stroke = [6.0, 9.0], [2.0, 1.8]
+    springs = {"stiffness": stiffness, "stroke": stroke, "positions": feet}
+    drifts = []
+    for step in (4e-3, 2e-3):
+        model, data = connected(BODIES, step, RELEASED, opens_at=0.0, springs=springs)
+        pose, _ = port_frames.docked(model, ["port", "rail"], data.qpos, data.qvel)
+        data.qpos[8:15] = pose
+        data.qvel[:] = [0.1, 0.0, -0.1, 0.4, -0.3, 0.5, 0.3, 0.0, 0.1, 0.1, -0.9, 0.6, -0.7]
+        model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+
+        def energies(model: Any = model, data: Any = data) -> tuple[float, Array]:
+            """Return the kinetic energy [J], and that of each spring, from MuJoCo's sites."""
+            mujoco.mj_forward(model, data)
+            one, two = (data.site(name) for name in ("port", "rail"))
+            axes = [each.xmat.reshape(3, 3) for each in (one, two)]
+            places = two.xpos - one.xpos + np.array(feet) @ (axes[1] - axes[0]).T
+            left = np.array(stroke) - places @ axes[0][:, 0]
+            assert (left > 0.0).all()
+            return float(data.energy[1]), 0.5 * np.array(stiffness) * left**2
+
+        moving, pressed = energies()
+        first, seen = moving + pressed.sum(), [moving]
+        for _ in range(round(0.6 / step)):
+            mujoco.mj_step(model, data)
+            seen.append(energies()[0])
+        moving, pressed = energies()
+        assert np.ptp(seen) > 0.5 * first  # that passes from the springs to the motion
+        between = data.site("port").xmat.reshape(3, 3).T @ data.site("rail").xmat.reshape(3, 3)
+        assert np.trace(between) < 0.0  # they have turned against each other by more than 120 deg
+        drifts.append(abs((moving + pressed.sum()) / first - 1.0))
+    assert drifts[0] < 1e-8
+    assert np.log2(drifts[0] / drifts[1]) > 3.7  # RK4's
+
+
 def test_springs_push_with_all_their_energy() -> None:
     model, data = connected(
         LOOSE, 1e-4, RELEASED, opens_at=0.0, springs={"stiffness": 400.0, "stroke": 0.1}

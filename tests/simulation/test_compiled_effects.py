@@ -7,14 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 from blocks import blocks_of
-from compiled_flights import SHORT_BLOCKS, assembly, assert_same, flown, one_of
+from compiled_flights import SHORT_BLOCKS, assembly, assert_same, flown, one_of, start_of_row
 
 from mjspace.environment.install import install_callbacks
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation import loop, mujoco_warnings
 from mjspace.simulation.compiled_flight import CompiledFlight
-from mjspace.simulation.initial_state import INTEGRATION, Start, first_start
-from mjspace.simulation.stepper import Stepper
+from mjspace.simulation.initial_state import INTEGRATION, first_start
 from mjspace.tracing.inner_loops import Untraceable
 
 pytestmark = SHORT_BLOCKS
@@ -165,19 +164,7 @@ def test_any_logged_period_is_a_start(case: str) -> None:
     built = assembly(name, *overrides)
     whole = flown(built)
     middle = 2 * len(whole.rows["time"]) // 3
-    logged: dict[str, dict[str, np.ndarray]] = {"sensor": {}, "actuator": {}, "law": {}}
-    for topic, values in whole.rows.items():
-        kind, _, field = topic.removeprefix("/state.").partition("_")
-        if topic.startswith("/state.") and kind in logged:
-            logged[kind][field] = values[middle]
-    reference = built.reference.at(np.zeros(1))
-    law = built.law.reset(
-        Stepper(built, first_start(built, [0])).sense(0).measurement,
-        type(reference)(*(a[0] for a in reference)),
-    )
-    state = type(law)(*(logged["law"][field] for field in law._fields)) if law else ()
-    physics = whole.rows["/state.physics"][middle]
-    again = flown(built, start=Start(middle, physics, logged["sensor"], state, logged["actuator"]))
+    again = flown(built, start=start_of_row(built, whole, middle))
     assert again.compiled == ALL.format(effects)
     for field, values in again.rows.items():
         assert values.tobytes() == whole.rows[field][middle:].tobytes(), field

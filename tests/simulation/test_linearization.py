@@ -3,16 +3,20 @@
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from command_lines import command_line
+from compiled_flights import Flown, assembly, flown
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from own_models import SENSED, write
 from scipy.linalg import expm
 
 import mjspace
+from mjspace import attitude
 from mjspace.errors import InputError
+from mjspace.simulation.initial_state import INTEGRATION, initial_physics, start_at
 from mjspace.simulation.linear_plant import LinearPlant
 
 RIGID = """
@@ -355,3 +359,112 @@ def test_the_file_holds_it_all(rigid: Path, tmp_path: Path) -> None:
             np.testing.assert_array_equal(read[name], getattr(plant, name))
     with pytest.raises(OSError, match="No such file"):
         plant.save(tmp_path / "none" / "plant.npz")
+
+
+STEP = 2e-4
+TWO = [
+    *(f"rates.physics={STEP}", f"rates.control={STEP}", f"duration={2 * STEP}", "events=[]"),
+    *("checks=[]", "law={kind='coast:Coast'}", "initial.velocity=[0.1,0,0]"),
+    *("initial.rate=[0.2,-0.1,0.15]", "initial.wheel_speed=[20,-30,10]"),
+    "sensors.navigation={measures='model',of='dock_attitude',noise_std='0.1 deg'}",
+]
+APART = [f"plant.spacecraft.target.{key}" for key in ("velocity=[0,0.1,0]", "rate=[0.3,0.2,-0.4]")]
+DOCKED = [
+    "plant.spacecraft={target={mass=40,inertia=[[4,0.1,0],[0.1,3,0],[0,0,5]],"
+    "ports={drogue={position=[-0.4,0,0.1],euler=[0.2,0,0.3]}}}}",
+    "plant.connections.dock={between=['probe','target_drogue'],closed=true,frequency=0.2}",
+]
+
+
+@pytest.mark.parametrize("overrides", [APART, DOCKED], ids=["apart", "docked"])
+def test_two_spacecraft_move_and_are_seen_as_they_fly(overrides: list[str]) -> None:
+    """Differences of two flights of tumbling spacecraft: all states, and relative navigation."""
+    plant = mjspace.linearize("tumbling-target-capture", [*TWO, *overrides])
+    built = assembly("tumbling-target-capture", *TWO, *overrides)
+    model, nominal = built.vehicle.model, initial_physics(built, 1)[0]
+    wheels = set(built.vehicle.wheel_dof)  # on whose angles nothing depends
+    kept = [i for i in range(2 * model.nv) if i not in wheels]
+    data, other = mujoco.MjData(model), mujoco.MjData(model)
+
+    def flight(error: np.ndarray) -> Flown:
+        """Fly from a state with an ``error`` in the coordinates of ``qvel``, and in ``qvel``."""
+        mujoco.mj_setState(model, data, nominal, INTEGRATION)
+        mujoco.mj_integratePos(model, data.qpos, error[: model.nv], 1.0)
+        data.qvel[:] += error[model.nv :]
+        row = np.empty((1, len(nominal)))
+        mujoco.mj_getState(model, data, row[0], INTEGRATION)
+        return flown(built, start=start_at(built, row, [0]))
+
+    def between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+        """Return the error of the second state from the first."""
+        for each, row in ((data, one), (other, two)):
+            mujoco.mj_setState(model, each, row, INTEGRATION)
+        apart = np.zeros(model.nv)
+        mujoco.mj_differentiatePos(model, apart, 1.0, data.qpos, other.qpos)
+        return np.concatenate([apart, other.qvel - data.qvel])[kept]
+
+    outputs = np.array([name.partition("[")[0] for name in plant.outputs])
+    random, size = np.random.default_rng(7), 1e-4
+    for _ in range(3):
+        error = np.zeros(2 * model.nv)
+        error[kept] = random.normal(size=len(kept))
+        up, down = (flight(sign * size * error).rows for sign in (1.0, -1.0))
+        physics = zip(down["/state.physics"][:, 0], up["/state.physics"][:, 0], strict=True)
+        states = [between(*rows) / (2.0 * size) for rows in physics]
+        derivative = (-3.0 * states[0] + 4.0 * states[1] - states[2]) / (2.0 * STEP)
+        # Differences: of (2 pi f)^3 h^2 / 3 in time, size^2 / 6 in the states.
+        np.testing.assert_allclose(plant.A @ error[kept], derivative, atol=1e-5)
+        np.testing.assert_allclose(plant.Ad @ error[kept], states[1], atol=1e-7)
+        for name in dict.fromkeys(outputs):
+            topic = "dock_attitude" if name == "navigation" else name
+            one, two = (rows[f"/truth.{topic}"][0, 0] for rows in (down, up))
+            seen = two - one
+            if topic.endswith("attitude"):
+                seen = attitude.multiply(attitude.conjugate(one), two)
+                seen = attitude.to_rotation_vector(seen)
+            expected = plant.C[outputs == name] @ error[kept]
+            np.testing.assert_allclose(seen / (2.0 * size), expected, atol=1e-6, err_msg=name)
+    assert {"navigation", "target_position", "target_velocity", "dock_rate"} <= set(outputs)
+
+
+JOINTED = """
+<mujoco>
+  <worldbody>
+    <body name="bus">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="10" diaginertia="1 2 2.5"/>
+      <body name="head" pos="0 0 0.3">
+        <joint name="neck" type="ball"/>
+        <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.2 0.25"/>
+      </body>
+    </body>
+    <body name="moon" pos="3 0 0">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="2" diaginertia="0.3 0.2 0.4"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_each_joint_that_turns_freely_has_its_kinematics_and_names(tmp_path: Path) -> None:
+    """attitude' = rate - w x attitude, of a second free body and of a ball joint."""
+    path = write(tmp_path, JOINTED)
+    turning = "plant.spacecraft.moon={rate=[0.3,-0.1,0.2],velocity=[0,1,0]}"
+    plant = mjspace.linearize(path, ["initial.rate=[0,0,0.5]", turning])
+    rates = {"": [0.0, 0.0, 0.5], "moon.": [0.3, -0.1, 0.2], "neck.": [0.0, 0.0, 0.0]}
+    for name, turning_at in rates.items():
+        of_itself = block(plant, "A", f"{name}attitude", f"{name}attitude")
+        np.testing.assert_array_equal(of_itself, -cross(np.array(turning_at)))
+        np.testing.assert_array_equal(
+            block(plant, "A", f"{name}attitude", f"{name}rate"), np.eye(3)
+        )
+    np.testing.assert_array_equal(block(plant, "A", "moon.position", "moon.velocity"), np.eye(3))
+    inertia, rate = np.diag([0.3, 0.2, 0.4]), np.array([0.3, -0.1, 0.2])
+    of_rates = np.linalg.solve(inertia, cross(inertia @ rate) - cross(rate) @ inertia)
+    np.testing.assert_allclose(block(plant, "A", "moon.rate", "moon.rate"), of_rates, atol=1e-9)
+    units = dict(zip(plant.states, plant.state_units, strict=True))
+    assert [units[f"{name}[2]"] for name in ("moon.position", "neck.attitude", "moon.rate")] == [
+        *("m", "rad", "rad/s")
+    ]
+    assert len(set(plant.states)) == len(plant.states) == 30

@@ -5,6 +5,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from blocks import blocks_of
 from compiled_flights import SHORT_BLOCKS, assert_same, flown
 from own_models import LAW, SENSED, built, write
 
@@ -198,21 +199,46 @@ def test_each_is_measured_under_a_name_of_its_own(tmp_path: Path) -> None:
     assert set(names.values()) <= log.read("/measurement").keys()
 
 
-def test_with_masses_that_burn_they_tell_of_those_of_the_instant(tmp_path: Path) -> None:
-    path = probe(tmp_path, BALANCED, force=3.0)
-    law = tmp_path / "law.py"
+# Along the jet: through the centre of mass, a gram in each control period.
+BURNS = (
+    "plant.rcs={positions=[[0,0,-0.1]],directions=[[0,0,1]],thrust=1,specific_impulse=2.0394,"
+    "propellant=0.5}"
+)
+
+
+def burning(folder: Path, model: str = BALANCED, *, extra: str = "") -> Path:
+    path = probe(folder, model, force=3.0, extra=extra)
+    law = folder / "law.py"
     text = law.read_text().replace("class Law", "    on_time: np.ndarray\nclass Law")
     law.write_text(text.replace("0.0)), None", "0.0), np.full((*rows, 1), 0.02)), None"))
-    # Along the jet: through the centre of mass, a gram in each control period.
-    tank = "specific_impulse=2.0394,propellant=0.5"
-    rcs = f"plant.rcs={{positions=[[0,0,-0.1]],directions=[[0,0,1]],thrust=1,{tank}}}"
-    result = run(path, out=tmp_path / "out", overrides=[rcs, "duration=1"])
+    return path
+
+
+def test_with_masses_that_burn_they_tell_of_those_of_the_instant(tmp_path: Path) -> None:
+    path = burning(tmp_path)
+    result = run(path, out=tmp_path / "out", overrides=[BURNS, "duration=1"])
     truth = result.log.read("/truth", ["imu", "propellant"])
     mass = MASS + truth["propellant"][:, 0]
     assert mass[0] - mass[-1] == pytest.approx(0.05, rel=1e-3)
     np.testing.assert_allclose(truth["imu"][1:, 2], 4.0 / mass[1:], rtol=1e-9)
     assert verify(result.path, start=0.5, trust=True) is None
-    assert "masses that burn" in flown(assemble(*load(path, [rcs, "duration=0.1"]))).compiled
+
+
+@pytest.mark.parametrize("lands", [False, True])
+def test_with_masses_that_burn_they_are_compiled_as_in_python(lands: bool, tmp_path: Path) -> None:
+    # On the ground the forces of contacts, which depend on what is derived of masses, are felt too.
+    damped = PROBE.replace('axis="0 0 1"', 'axis="0 0 1" damping="1"')
+    ground = "[environment.gravity]\n[plant.ground]\n"
+    path = burning(tmp_path, *([damped] if lands else []), extra=ground if lands else "")
+    settings = [BURNS, "duration=1", *(["initial.position=[0,0,0.102]"] if lands else [])]
+    built = assemble(*load(path, settings))
+    python = flown(built, (0, 1), compiled=False)
+    for periods in (7, 40):
+        with blocks_of(periods):
+            compiled = flown(built, (0, 1), threads=2)
+        assert compiled.compiled.startswith("compiled: sensors, law, actuators and step effects")
+        assert_same(compiled, python)
+    assert bool(python.rows["/measurement.below"].max() > 1.0) is lands
 
 
 def test_a_scenario_says_how_a_sensor_samples(tmp_path: Path) -> None:

@@ -150,6 +150,15 @@ def test_a_soft_weld_is_no_rigid_one(tmp_path: Path) -> None:
             "</spatial></tendon>",
             "tendon 'cord'",
         ),
+        (
+            {
+                "world": '<geom name="drum" type="cylinder" size="0.1 1" pos="0.5 0.5 0"/>',
+                "bus": BODY + '<site name="eye" pos="0 1 0"/><site name="ear" pos="1 0 0"/>',
+            },
+            '<tendon><spatial name="band" stiffness="1"><site site="eye"/><geom geom="drum"/>'
+            '<site site="ear"/></spatial></tendon>',
+            "tendon 'band'",
+        ),
         ({"world": f'<body><joint name="arm" stiffness="1"/>{BODY}</body>'}, "", "joint 'arm'"),
     ],
 )

@@ -5,13 +5,16 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from own_models import HOLD, built
+from hypothesis import given
+from hypothesis import strategies as st
+from own_models import HOLD, SENSED, built
 
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
+from mjspace.vehicle.other_spacecraft import OtherSpacecraft
 from mjspace.vehicle.vehicle import inertials
 
 TARGET = "plant.spacecraft.target={mass=4,inertia=[[2,0.3,0],[0.3,1,0],[0,0,1.5]]"
@@ -124,12 +127,50 @@ PORT = "plant.ports.q={}"
     ("overrides", "message"),
     [
         (["plant.spacecraft.target={mass=4}"], "mass and inertia: give both"),
-        (["plant.spacecraft.target={}"], "plant.spacecraft: target: give mass and inertia"),
+        (["plant.spacecraft.target={}"], "plant.spacecraft.target: give mass and inertia"),
         ([TARGET.replace("target", "arm") + "}"], "arm: the model has a body of that name"),
+        ([TARGET.replace("target", "elbow") + "}"], "elbow: the model has a joint of that name"),
+        (
+            ["plant.spacecraft.target={mass=4,inertia=[[1,0,0],[0,1,0],[0,0,2.1]]}"],
+            "plant.spacecraft.target.inertia: no rigid body has the principal moments 1, 1, 2.1 "
+            "kg m^2: the largest exceeds the sum of the others by 0.1",
+        ),
+        (
+            ["plant.spacecraft.target={mass=4,inertia=[[1,2,0],[2,1,0],[0,0,2]]}"],
+            "plant.spacecraft.target.inertia: not positive definite",
+        ),
+        (
+            [TARGET + PORTS, PORT, CONNECTED.replace(".c=", ".target=")],
+            "plant.connections.target: target_position is measured of plant.spacecraft.target too",
+        ),
+        (
+            [TARGET.replace("target", "orbit") + "}"],
+            "plant.spacecraft.orbit: orbit_position is a name of mjspace's own: call it otherwise",
+        ),
+        (
+            [TARGET.replace("target", "imu") + "}"],
+            "plant.spacecraft.imu: imu_rate is a sensor of plant.model: call it otherwise",
+        ),
+        (
+            [TARGET + PORTS, "plant.ports.target_p={}"],
+            "plant.ports.target_p: there is a site 'target_p' already: call it otherwise",
+        ),
+        (
+            [TARGET + ",ports={a_b={}}}", TARGET.replace("target", "target_a") + ",ports={b={}}}"],
+            "plant.spacecraft.target_a.ports.b: there is a site 'target_a_b' already",
+        ),
+        (
+            [TARGET + "}", "sensors.target_rate.measures=rate"],
+            "sensors.target_rate: the model has a sensor of that name",
+        ),
+        (
+            [TARGET + PORTS, PORT, CONNECTED, "sensors.c_closed.measures=rate"],
+            "sensors.c_closed: the model has a sensor of that name",
+        ),
         ([TARGET + ",size=[1,2]}"], "size: 2 sides, should be 3"),
         ([TARGET + ",euler=[0,0,0],attitude=[1,0,0,0]}"], "attitude and euler are both given"),
-        (["plant.ports.imu={}"], "the model has a site 'imu' already"),
-        (["plant.ports.q={body='amr'}"], "no body 'amr': did you mean 'arm'"),
+        (["plant.ports.imu={}"], "plant.ports.imu: there is a site 'imu' already"),
+        (["plant.ports.q={body='amr'}"], "plant.ports.q: no body 'amr': did you mean 'arm'"),
         (
             [TARGET + ",velocity=[1,0,0],ports={p={}}}", PORT, CONNECTED],
             "spacecraft.target: it begins docked, by connections.c: leave out its position",
@@ -157,3 +198,24 @@ def test_unfit_spacecraft_are_refused(tmp_path: Path, overrides: list[str], mess
         built(tmp_path, *overrides)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_sensor_of_ones_own_keeps_its_name(tmp_path: Path) -> None:
+    model = SENSED.replace('"star-tracker"', '"c-closed"')
+    settings = [TARGET + PORTS, PORT, CONNECTED]
+    with pytest.raises(InputError, match=r"connections\.c: c_closed is a sensor of plant"):
+        built(tmp_path, *settings, model=model)
+
+
+@given(st.integers(0, 10**6))
+def test_a_plate_however_it_is_turned_is_a_body(seed: int) -> None:
+    # Its largest moment is the sum of the others: rounded, MuJoCo would refuse it.
+    axes = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    inertia = axes @ np.diag([1.0, 2.0, 3.0]) @ axes.T
+    inertia = 0.5 * (inertia + inertia.T)
+    spec = mujoco.MjSpec()
+    bus = spec.worldbody.add_body(name="bus")
+    table = OtherSpacecraft.model_validate({"mass": 5.0, "inertia": inertia.tolist()})
+    table.attach(spec, "plate", bus)
+    moments = spec.compile().body("plate").inertia
+    np.testing.assert_allclose(np.sort(moments), [1.0, 2.0, 3.0], rtol=1e-12)
