@@ -112,7 +112,7 @@ def _alone(members: Population, number: int) -> Flown:
     began = time.perf_counter()
     assembly, draws = members.member(number)
     start = start_at(assembly, initial_physics(assembly, 1), [number])
-    (verdicts,), trouble = _judged(assembly, start, [number])
+    (verdicts,), trouble = judged(assembly, start, [number])
     return Flown(number, draws, verdicts, trouble, time.perf_counter() - began)
 
 
@@ -126,7 +126,7 @@ def _batch(members: Population, numbers: Sequence[int]) -> list[Flown]:
         physics.append(initial_physics(assembly, 1))
     # Nothing but these rows differs, so that the last member's assembly does for all.
     start = start_at(assembly, np.concatenate(physics), numbers)
-    verdicts, trouble = _judged(assembly, start, numbers)
+    verdicts, trouble = judged(assembly, start, numbers)
     if trouble and len(numbers) > 1:
         half = len(numbers) // 2
         return _batch(members, numbers[:half]) + _batch(members, numbers[half:])
@@ -137,10 +137,14 @@ def _batch(members: Population, numbers: Sequence[int]) -> list[Flown]:
     ]
 
 
-def _judged(
+def judged(
     assembly: Assembly, start: Start, members: Sequence[int]
 ) -> tuple[list[list[Verdict]], str]:
-    """Return the verdicts of each member, and why the flight ended early."""
+    """Fly the members and return the verdicts of each, and why the flight ended early.
+
+    Raises:
+        InputError: a check names no signal of the flight.
+    """
     judges: list[Judge] = []
     trouble = ""
     scenario = assembly.scenario
