@@ -3,7 +3,7 @@
 import json
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -72,7 +72,7 @@ def fly_members(call: Call) -> list[Flown]:
         FlightError: a draw did not arrive in the flight; or a member alone is not as in a batch.
         OSError: a log cannot be written.
     """
-    members = _same(call.campaign, json.dumps(call.identity))
+    members = same(call.campaign, call.identity)
     if together(members):
         flown = _batch(members, call.members)
     else:
@@ -83,13 +83,17 @@ def fly_members(call: Call) -> list[Flown]:
     return flown
 
 
-@lru_cache(maxsize=1)
-def _same(campaign: Campaign, identity: str) -> Population:
+def same(campaign: Campaign, identity: Mapping[str, Any]) -> Population:
     """Return the members, once for the calls of a process, if they are those that began.
 
     Raises:
         InputError: the files have changed since.
     """
+    return _same(campaign, json.dumps(identity))
+
+
+@lru_cache(maxsize=1)
+def _same(campaign: Campaign, identity: str) -> Population:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # shown where the campaign began
         members = population(campaign)

@@ -101,6 +101,15 @@ class Population:
             FlightError: a draw did not arrive in what is to fly.
         """
         (drawn,) = self.drawn([number])
+        return self.built(drawn, f"member {number} of the campaign"), drawn
+
+    def built(self, drawn: Sequence[Any], name: str) -> Assembly:
+        """Return the assembly with these draws; errors call it by ``name``.
+
+        Raises:
+            InputError: the scenario does not admit what was drawn.
+            FlightError: a draw did not arrive in what is to fly.
+        """
         table = copy.deepcopy(dict(self.table))
         table.pop("dispersions", None)
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
@@ -111,10 +120,10 @@ class Population:
                 scenario = validated(table, str(self.path), self.origins)
                 assembly = assemble(scenario, self.path.parent, trust=self.campaign.trust)
         except InputError as error:
-            raise InputError(f"member {number} of the campaign: {error}") from error
+            raise InputError(f"{name}: {error}") from error
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
-            require_arrival(assembly, dispersion, value, number)
-        return assembly, drawn
+            require_arrival(assembly, dispersion, value, name)
+        return assembly
 
 
 def population(campaign: Campaign) -> Population:
@@ -173,7 +182,7 @@ def put(table: Any, written: Any, path: Sequence[str], value: Any) -> None:
     place[int(last) if isinstance(place, list) else last] = value
 
 
-def require_arrival(assembly: Assembly, dispersion: Dispersion, drawn: Any, member: int) -> None:
+def require_arrival(assembly: Assembly, dispersion: Dispersion, drawn: Any, name: str) -> None:
     """Read the value back from what is to fly, and refuse another than was drawn.
 
     Raises:
@@ -191,8 +200,8 @@ def require_arrival(assembly: Assembly, dispersion: Dispersion, drawn: Any, memb
         arrived = bool(np.allclose(flown, drawn, rtol=1e-3 * ("attitude" in name), atol=0.0))
     if not arrived:
         raise FlightError(
-            f"dispersion {dispersion.key} did not arrive: member {member} drew {drawn}, and would "
-            f"fly with {flown}"
+            f"dispersion {dispersion.key} did not arrive: {name} drew {drawn}, and would fly with "
+            f"{flown}"
         )
 
 

@@ -221,11 +221,11 @@ def test_what_did_not_arrive_is_named(tmp_path: Path) -> None:
     assembly, drawn = everyone.member(1)
     for dispersion, value in zip(everyone.dispersions, drawn, strict=True):
         with pytest.raises(FlightError) as raised:
-            require_arrival(assembly, dispersion, value + 1e-9, 1)
+            require_arrival(assembly, dispersion, value + 1e-9, "member 1")
         assert f"dispersion {dispersion.key} did not arrive" in str(raised.value)
     moved = replace(assembly, qvel=np.zeros_like(assembly.qvel))
     with pytest.raises(FlightError, match=r"initial.rate\[0\] did not arrive"):
-        require_arrival(moved, everyone.dispersions[0], drawn[0], 1)
+        require_arrival(moved, everyone.dispersions[0], drawn[0], "member 1")
 
 
 @pytest.mark.parametrize(
