@@ -13,18 +13,17 @@ from mjspace.campaign import draws, robustness
 from mjspace.campaign.flights import judged, same
 from mjspace.campaign.members import Campaign, Population, population
 from mjspace.campaign.search import minimize
+from mjspace.campaign.written import write_scenario
 from mjspace.contract import Array
 from mjspace.errors import FlightError, InputError
 from mjspace.interrupts import on_signals
 from mjspace.runner import workers
 from mjspace.runner.output import LOG
 from mjspace.runner.run import Result, fly_to_log
-from mjspace.scenario.loading import to_toml
 from mjspace.simulation.initial_state import first_start
 
 EDGE = 0.00135
 """Probability that is left out at either end of what is drawn: three sigma of a normal one."""
-SCENARIO = "scenario.toml"
 HALVINGS = 6
 """Of the distance to the scenario's own value, of each number that is made smaller."""
 Told = Callable[[int, int], None]
@@ -194,13 +193,5 @@ def write(members: Population, found: Candidate, folder: Path) -> Result:
     """
     assembly = members.built(found.draws, "the counterexample")
     result = fly_to_log(assembly, folder / LOG)
-    scenario = assembly.scenario
-    (folder / SCENARIO).write_text(to_toml(scenario))
-    components = (scenario.law.kind, scenario.reference.kind)
-    named = (*components, scenario.plant.model, scenario.environment.python or "")
-    for name, content in assembly.sources.items():
-        top, inside, _ = name.partition("/")
-        if any(kind.startswith(top + (inside or ":")) for kind in named):
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_bytes(content)
+    write_scenario(assembly, folder)
     return result

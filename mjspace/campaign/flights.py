@@ -83,20 +83,20 @@ def fly_members(call: Call) -> list[Flown]:
     return flown
 
 
-def same(campaign: Campaign, identity: Mapping[str, Any]) -> Population:
+def same(campaign: Campaign, identity: Mapping[str, Any], *, alike: bool = False) -> Population:
     """Return the members, once for the calls of a process, if they are those that began.
 
     Raises:
         InputError: the files have changed since.
     """
-    return _same(campaign, json.dumps(identity))
+    return _same(campaign, json.dumps(identity), alike)
 
 
 @lru_cache(maxsize=1)
-def _same(campaign: Campaign, identity: str) -> Population:
+def _same(campaign: Campaign, identity: str, alike: bool) -> Population:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # shown where the campaign began
-        members = population(campaign)
+        members = population(campaign, alike=alike)
     if json.dumps(members.identity) != identity:
         raise InputError(f"{members.path}: the scenario, or its law, changed during the campaign")
     return members

@@ -4,7 +4,7 @@ import copy
 import hashlib
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -73,10 +73,11 @@ class Population:
     @cached_property
     def own_values(self) -> list[Any]:
         """The scenario's own value of each dispersed key."""
-        return [value_at(self._written, each.path) for each in self.dispersions]
+        return [value_at(self.written, each.path) for each in self.dispersions]
 
     @cached_property
-    def _written(self) -> Any:
+    def written(self) -> Any:
+        """The scenario with every default written out."""
         return plain(self.scenario.model_dump(mode="python"))
 
     @cached_property
@@ -84,6 +85,13 @@ class Population:
         """What makes two campaigns the same, but for the number of members."""
         sources = {n: hashlib.sha256(c).hexdigest() for n, c in self.nominal.sources.items()}
         return {"scenario": to_toml(self.scenario), "sources": sources}
+
+    def with_values(self, values: Mapping[tuple[str, ...], Any]) -> "Population":
+        """Return the members with other values at these paths of the scenario, in SI."""
+        table = copy.deepcopy(dict(self.table))
+        for path, value in values.items():
+            put(table, self.written, path, value)
+        return replace(self, table=table)
 
     def drawn(self, members: Sequence[int]) -> list[list[Any]]:
         """Return the value of each dispersion of each of the members."""
@@ -113,7 +121,7 @@ class Population:
         table = copy.deepcopy(dict(self.table))
         table.pop("dispersions", None)
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
-            put(table, self._written, dispersion.path, _with_unit(dispersion, value))
+            put(table, self.written, dispersion.path, _with_unit(dispersion, value))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the scenario's own have been shown
@@ -126,21 +134,22 @@ class Population:
         return assembly
 
 
-def population(campaign: Campaign) -> Population:
+def population(campaign: Campaign, *, alike: bool = False) -> Population:
     """Return the members of the campaign; its files are read.
 
     Raises:
-        InputError: bad input, in one line.
+        InputError: bad input, in one line; unless they may be ``alike``, that they would be.
     """
     table, path, origins = read(campaign.scenario, campaign.all_overrides)
     scenario = validated(table, str(path), origins)
     nominal = assemble(scenario, path.parent, trust=campaign.trust)
-    if not (scenario.dispersions or scenario.faults or nominal.sensors([0]).ticks):
+    differ = scenario.dispersions or scenario.faults or nominal.sensors([0]).ticks
+    if not (differ or alike):
         raise InputError(f"{path}: dispersions: none, and no noise: every member would be alike")
     found = Population(campaign, table, path, origins, nominal)
     for number, dispersion in enumerate(scenario.dispersions):
         with input_error_at(f"{path}: dispersions.{number}.key"):
-            _refuse_unfit(dispersion, value_at(found._written, dispersion.path))
+            _refuse_unfit(dispersion, value_at(found.written, dispersion.path))
     return found
 
 

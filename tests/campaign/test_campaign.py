@@ -1,6 +1,5 @@
 """Campaigns flown: each member as alone, one table however it is divided, and resumed."""
 
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from mjspace.campaign.statistics import Gate
 from mjspace.campaign.store import WALL_TIME, Store
 from mjspace.errors import FlightError, InputError
 from mjspace.log.reader import Log
-from mjspace.runner import workers
 
 SCENARIO = """
 base = "detumble-wheels"
@@ -56,18 +54,6 @@ key = "law.rate_gain"
 distribution = "discrete"
 values = [5, 6]
 """
-
-
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let this process fly instead of others, which take seconds to begin."""
-
-    def each(calls: Sequence[Any], *_: Any) -> Iterator[tuple[int, Any]]:
-        # In another order than they are begun in, as processes may end.
-        for index, (call, argument) in reversed(list(enumerate(calls))):
-            yield index, call(argument)
-
-    monkeypatch.setattr(workers, "each", each)
 
 
 def scenario(folder: Path, text: str = SCENARIO) -> str:

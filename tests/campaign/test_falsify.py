@@ -1,8 +1,7 @@
 """Falsification: planted weaknesses found, made minimal, and written as a scenario and a log."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ from mjspace.campaign.members import Campaign, population
 from mjspace.campaign.search import minimize
 from mjspace.errors import InputError
 from mjspace.log.reader import Log
-from mjspace.runner import workers
 from mjspace.runner.checks import Verdict
 from mjspace.runner.run import run
 from mjspace.scenario.scenario import Check
@@ -59,22 +57,6 @@ std = 1e-4
 """
 UNSTABLE = 2.0 / 0.5
 """Gain over inertia from which on it is: w[k + 1] = (1 - T gain / inertia) w[k]."""
-
-
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let this process fly instead of others, which take seconds to begin."""
-
-    def make(calls: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        # In another order than they are begun in, as processes may end.
-        for index, (call, argument) in reversed(list(enumerate(calls))):
-            yield index, call(argument)
-
-    @contextmanager
-    def team(*_: Any) -> Iterator[Callable[..., Any]]:
-        yield make
-
-    monkeypatch.setattr(workers, "team", team)
 
 
 def scenario(folder: Path, text: str = SCENARIO) -> str:

@@ -2,9 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 from command_lines import command_line
@@ -12,7 +10,6 @@ from command_lines import command_line
 from mjspace.campaign.margins import Margin, Question, Trial, find
 from mjspace.campaign.requirement import objective, requirement
 from mjspace.errors import InputError
-from mjspace.runner import workers
 
 SCENARIO = """
 base = "detumble-wheels"
@@ -31,17 +28,6 @@ wheel_speed = [0, 0, 0]
 STABLE = "max(truth.rate) < 0.01 rad/s from 250 s"
 FED_BACK = 0.5 * 6.0 / (10.0 - 0.05)
 """a of w[k + 1] = w[k] - a w[k - d]: period times gain over the inertia of the bus about x."""
-
-
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let this process fly instead of others, which take seconds to begin."""
-
-    def each(calls: Sequence[Any], *_: Any) -> Iterator[tuple[int, Any]]:
-        for index, (call, argument) in enumerate(calls):
-            yield index, call(argument)
-
-    monkeypatch.setattr(workers, "each", each)
 
 
 @pytest.fixture
