@@ -102,7 +102,14 @@ The factors of the gain are of what the wheels apply, those of the inertia of wh
 
 {remarks}
 """
-REMARKS = ""
+REMARKS = """- **Delay.** The linear loop (2 s + 1) / s^2 crosses over at 2.06 rad/s with a phase margin of 76
+  deg: it is stable up to a delay of 0.65 s, less half of the control period. The laws come within a
+  sixth of that.
+- **Sampling.** Laws with a filter or an observer of their own, as the adaptive contraction law and
+  the one that observes the rate, have to be called more often than the others.
+- **Inertia.** What only feeds forward, as in PD+, hardly matters in so slow a slew. Where the
+  believed inertia multiplies the feedback, too little of it is too little gain.
+- **Adaptive laws** take somewhat more noise of the rate, and less of the attitude."""
 EXAMPLE = [
     *("margins", "lqr-regulation", "--only", "delay"),
     *("--require", "final(truth.attitude_error) < 1 deg"),
