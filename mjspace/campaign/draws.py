@@ -25,7 +25,7 @@ def uniforms(
     A member's are the same in whatever company it is drawn. Those of ``random`` and ``sobol`` do
     not depend on ``count`` either.
     """
-    width = sum(WIDTH.get(each.distribution, 1) for each in dispersions)
+    width = width_of(dispersions)
     if not width or not len(members):
         return np.empty((len(members), width))
     if sampling == "random":
@@ -39,6 +39,11 @@ def uniforms(
             points = kind(width, rng=rng).random(count)[list(members)]
     inside: Array = np.clip(points, _LEAST, 1.0 - _LEAST)
     return inside
+
+
+def width_of(dispersions: Sequence[Dispersion]) -> int:
+    """Return how many uniform numbers a member draws."""
+    return sum(WIDTH.get(each.distribution, 1) for each in dispersions)
 
 
 def values(dispersions: Sequence[Dispersion], nominal: Sequence[Any], row: Array) -> list[Any]:

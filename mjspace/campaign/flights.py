@@ -3,7 +3,7 @@
 import json
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -72,7 +72,7 @@ def fly_members(call: Call) -> list[Flown]:
         FlightError: a draw did not arrive in the flight; or a member alone is not as in a batch.
         OSError: a log cannot be written.
     """
-    members = _same(call.campaign, json.dumps(call.identity))
+    members = same(call.campaign, call.identity)
     if together(members):
         flown = _batch(members, call.members)
     else:
@@ -83,16 +83,20 @@ def fly_members(call: Call) -> list[Flown]:
     return flown
 
 
-@lru_cache(maxsize=1)
-def _same(campaign: Campaign, identity: str) -> Population:
+def same(campaign: Campaign, identity: Mapping[str, Any], *, alike: bool = False) -> Population:
     """Return the members, once for the calls of a process, if they are those that began.
 
     Raises:
         InputError: the files have changed since.
     """
+    return _same(campaign, json.dumps(identity), alike)
+
+
+@lru_cache(maxsize=1)
+def _same(campaign: Campaign, identity: str, alike: bool) -> Population:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # shown where the campaign began
-        members = population(campaign)
+        members = population(campaign, alike=alike)
     if json.dumps(members.identity) != identity:
         raise InputError(f"{members.path}: the scenario, or its law, changed during the campaign")
     return members
@@ -112,7 +116,7 @@ def _alone(members: Population, number: int) -> Flown:
     began = time.perf_counter()
     assembly, draws = members.member(number)
     start = start_at(assembly, initial_physics(assembly, 1), [number])
-    (verdicts,), trouble = _judged(assembly, start, [number])
+    (verdicts,), trouble = judged(assembly, start, [number])
     return Flown(number, draws, verdicts, trouble, time.perf_counter() - began)
 
 
@@ -126,7 +130,7 @@ def _batch(members: Population, numbers: Sequence[int]) -> list[Flown]:
         physics.append(initial_physics(assembly, 1))
     # Nothing but these rows differs, so that the last member's assembly does for all.
     start = start_at(assembly, np.concatenate(physics), numbers)
-    verdicts, trouble = _judged(assembly, start, numbers)
+    verdicts, trouble = judged(assembly, start, numbers)
     if trouble and len(numbers) > 1:
         half = len(numbers) // 2
         return _batch(members, numbers[:half]) + _batch(members, numbers[half:])
@@ -137,10 +141,14 @@ def _batch(members: Population, numbers: Sequence[int]) -> list[Flown]:
     ]
 
 
-def _judged(
+def judged(
     assembly: Assembly, start: Start, members: Sequence[int]
 ) -> tuple[list[list[Verdict]], str]:
-    """Return the verdicts of each member, and why the flight ended early."""
+    """Fly the members and return the verdicts of each, and why the flight ended early.
+
+    Raises:
+        InputError: a check names no signal of the flight.
+    """
     judges: list[Judge] = []
     trouble = ""
     scenario = assembly.scenario

@@ -4,7 +4,7 @@ import copy
 import hashlib
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -73,10 +73,11 @@ class Population:
     @cached_property
     def own_values(self) -> list[Any]:
         """The scenario's own value of each dispersed key."""
-        return [value_at(self._written, each.path) for each in self.dispersions]
+        return [value_at(self.written, each.path) for each in self.dispersions]
 
     @cached_property
-    def _written(self) -> Any:
+    def written(self) -> Any:
+        """The scenario with every default written out."""
         return plain(self.scenario.model_dump(mode="python"))
 
     @cached_property
@@ -84,6 +85,13 @@ class Population:
         """What makes two campaigns the same, but for the number of members."""
         sources = {n: hashlib.sha256(c).hexdigest() for n, c in self.nominal.sources.items()}
         return {"scenario": to_toml(self.scenario), "sources": sources}
+
+    def with_values(self, values: Mapping[tuple[str, ...], Any]) -> "Population":
+        """Return the members with other values at these paths of the scenario, in SI."""
+        table = copy.deepcopy(dict(self.table))
+        for path, value in values.items():
+            put(table, self.written, path, value)
+        return replace(self, table=table)
 
     def drawn(self, members: Sequence[int]) -> list[list[Any]]:
         """Return the value of each dispersion of each of the members."""
@@ -101,37 +109,47 @@ class Population:
             FlightError: a draw did not arrive in what is to fly.
         """
         (drawn,) = self.drawn([number])
+        return self.built(drawn, f"member {number} of the campaign"), drawn
+
+    def built(self, drawn: Sequence[Any], name: str) -> Assembly:
+        """Return the assembly with these draws; errors call it by ``name``.
+
+        Raises:
+            InputError: the scenario does not admit what was drawn.
+            FlightError: a draw did not arrive in what is to fly.
+        """
         table = copy.deepcopy(dict(self.table))
         table.pop("dispersions", None)
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
-            put(table, self._written, dispersion.path, _with_unit(dispersion, value))
+            put(table, self.written, dispersion.path, _with_unit(dispersion, value))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the scenario's own have been shown
                 scenario = validated(table, str(self.path), self.origins)
                 assembly = assemble(scenario, self.path.parent, trust=self.campaign.trust)
         except InputError as error:
-            raise InputError(f"member {number} of the campaign: {error}") from error
+            raise InputError(f"{name}: {error}") from error
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
-            require_arrival(assembly, dispersion, value, number)
-        return assembly, drawn
+            require_arrival(assembly, dispersion, value, name)
+        return assembly
 
 
-def population(campaign: Campaign) -> Population:
+def population(campaign: Campaign, *, alike: bool = False) -> Population:
     """Return the members of the campaign; its files are read.
 
     Raises:
-        InputError: bad input, in one line.
+        InputError: bad input, in one line; unless they may be ``alike``, that they would be.
     """
     table, path, origins = read(campaign.scenario, campaign.all_overrides)
     scenario = validated(table, str(path), origins)
     nominal = assemble(scenario, path.parent, trust=campaign.trust)
-    if not (scenario.dispersions or scenario.faults or nominal.sensors([0]).ticks):
+    differ = scenario.dispersions or scenario.faults or nominal.sensors([0]).ticks
+    if not (differ or alike):
         raise InputError(f"{path}: dispersions: none, and no noise: every member would be alike")
     found = Population(campaign, table, path, origins, nominal)
     for number, dispersion in enumerate(scenario.dispersions):
         with input_error_at(f"{path}: dispersions.{number}.key"):
-            _refuse_unfit(dispersion, value_at(found._written, dispersion.path))
+            _refuse_unfit(dispersion, value_at(found.written, dispersion.path))
     return found
 
 
@@ -173,7 +191,7 @@ def put(table: Any, written: Any, path: Sequence[str], value: Any) -> None:
     place[int(last) if isinstance(place, list) else last] = value
 
 
-def require_arrival(assembly: Assembly, dispersion: Dispersion, drawn: Any, member: int) -> None:
+def require_arrival(assembly: Assembly, dispersion: Dispersion, drawn: Any, name: str) -> None:
     """Read the value back from what is to fly, and refuse another than was drawn.
 
     Raises:
@@ -191,8 +209,8 @@ def require_arrival(assembly: Assembly, dispersion: Dispersion, drawn: Any, memb
         arrived = bool(np.allclose(flown, drawn, rtol=1e-3 * ("attitude" in name), atol=0.0))
     if not arrived:
         raise FlightError(
-            f"dispersion {dispersion.key} did not arrive: member {member} drew {drawn}, and would "
-            f"fly with {flown}"
+            f"dispersion {dispersion.key} did not arrive: {name} drew {drawn}, and would fly with "
+            f"{flown}"
         )
 
 

@@ -12,9 +12,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from mjspace.campaign.flights import log_of
+from mjspace.campaign.robustness import relative
 from mjspace.campaign.statistics import CONFIDENCE, Gate, Rate, Spread, rank_correlation, spread
 from mjspace.campaign.store import WALL_TIME, Store
-from mjspace.contract import Array
 from mjspace.errors import printable
 from mjspace.scenario.scenario import Check
 
@@ -85,11 +85,11 @@ def answer(store: Store, gate: Gate | None) -> Answer:
     names = np.full(len(passed), -1)
     for number, (name, check) in enumerate(store.checks.items()):
         margins = store.column(f"{name}: margin")
-        relative = _relative(check, margins)
+        of_bound = relative(check, margins)
         outcomes = store.read([f"{name}: verdict"])[f"{name}: verdict"].to_pylist()
         wrong = np.array([outcome != check.expected for outcome in outcomes], dtype=bool)
-        lower = relative < least
-        least, names = np.where(lower, relative, least), np.where(lower, number, names)
+        lower = of_bound < least
+        least, names = np.where(lower, of_bound, least), np.where(lower, number, names)
         correlations = {d: rank_correlation(store.column(d), margins) for d in store.draws}
         measured = spread(store.column(f"{name}: measured"))
         checks.append(CheckFigures(name, _bound(check), int(wrong.sum()), measured, correlations))
@@ -106,17 +106,6 @@ def answer(store: Store, gate: Gate | None) -> Answer:
         gate,
         store.folder,
     )
-
-
-def _relative(check: Check, margins: Array) -> Array:
-    """Return margins over the size of the bound, to compare checks: half the width of two bounds.
-
-    What was expected to fail is worst where it holds; what was not measured is worst of all.
-    """
-    bounds = [float(b) for b in (check.below, check.above) if b is not None]
-    size = abs(bounds[0]) if len(bounds) == 1 else (bounds[0] - bounds[1]) / 2.0
-    sign = 1.0 if check.expected == "PASS" else -1.0
-    return np.where(np.isnan(margins), -np.inf, sign * margins / (size or 1.0))
 
 
 def _worst(store: Store, member: int, check: int) -> Worst:

@@ -9,14 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mjspace.campaign.flights import Flown
 from mjspace.campaign.members import Population
-from mjspace.contract import Array
+from mjspace.campaign.results import Results
 from mjspace.errors import InputError
 from mjspace.log import lock
-from mjspace.log.arrow import pyarrow_for
 from mjspace.log.provenance import software
 from mjspace.runner.checks import NO_CRASH, Verdict, margin
 from mjspace.runner.output import make_folder
@@ -50,7 +47,7 @@ def checks_of(members: Population) -> dict[str, Check]:
     return found
 
 
-class Store:
+class Store(Results):
     """The folder of one campaign."""
 
     def __init__(self, folder: Path, members: Population) -> None:
@@ -59,8 +56,8 @@ class Store:
         Raises:
             InputError: Parquet's library is not installed.
         """
-        self._arrow = pyarrow = pyarrow_for("a campaign")
-        self.folder, self._blocks = folder, folder / "members"
+        super().__init__(folder)
+        pyarrow = self._arrow
         self.draws, self.checks = draw_columns(members), checks_of(members)
         self._members = members
         kinds = {"member": pyarrow.int64(), "seed": pyarrow.int64(), "passed": pyarrow.bool_()}
@@ -130,13 +127,6 @@ class Store:
                 f"--n {count}, or {hint}"
             )
 
-    def finished(self) -> set[int]:
-        """Return the members that have been flown."""
-        found: set[int] = set()
-        for path in self._files():
-            found |= set(self._table(path, ["member"])["member"].to_pylist())
-        return found
-
     def write(self, flown: Sequence[Flown]) -> None:
         """Write a block of members, as a whole or not at all.
 
@@ -167,42 +157,8 @@ class Store:
             row[f"{name}: verdict"] = verdict.outcome
         return row
 
-    def read(self, columns: Sequence[str] | None = None) -> Any:
-        """Return the table of all members flown, or these columns of it, in their order."""
-        chosen = None if columns is None else list(dict.fromkeys(["member", *columns]))
-        tables = [self._table(path, chosen) for path in self._files()]
-        if not tables:
-            return self._schema.empty_table()
-        return self._arrow.concat_tables(tables).sort_by("member").combine_chunks()
-
-    def column(self, name: str) -> Array:
-        """Return a column of numbers, nan where there is none."""
-        found: Array = np.array(self.read([name])[name].to_numpy(zero_copy_only=False), dtype=float)
-        return found
-
-    def row(self, member: int) -> dict[str, Any]:
-        """Return all that the table has of a member.
-
-        Raises:
-            KeyError: it has not been flown.
-        """
-        for path in self._files():
-            first, last = map(int, path.stem.split("-"))
-            if first <= member <= last:
-                found: dict[str, Any] = (
-                    self._table(path, None).slice(member - first, 1).to_pylist()[0]
-                )
-                return found
-        raise KeyError(member)
-
-    def _files(self) -> list[Path]:
-        return sorted(self._blocks.glob("*.parquet"))
-
-    def _table(self, path: Path, columns: list[str] | None) -> Any:
-        try:
-            return self._arrow.parquet.read_table(path, columns=columns)
-        except self._arrow.ArrowInvalid as error:
-            raise InputError(f"{path}: {error}: remove it, and its members fly again") from error
+    def _empty(self) -> Any:
+        return self._schema.empty_table()
 
 
 def _number(value: float) -> float | None:

@@ -1,6 +1,7 @@
 """The command line: ``list``, ``info``, ``run``, ``replay``, ``render``, ``plot``, ``validate``.
 
-``campaign`` flies a scenario many times. ``convert`` and ``compare`` are for logs,
+``campaign`` flies a scenario many times, ``falsify`` searches for a flight that fails, ``margins``
+says how much worse it may become, ``tune`` finds gains. ``convert`` and ``compare`` are for logs,
 ``law-header``, ``serve-law`` and ``linearize`` for flight software; ``recover`` saves what is whole
 of a damaged log. Exit status: 0 every check came out as the scenario expects, 1 flown but one did
 not (or a replay or a comparison differed, or the flight ended early), 2 bad input. Modules are
@@ -19,10 +20,12 @@ from mjspace.cli import (
     data,
     flight_software,
     flights,
+    margins,
     models,
     pictures,
     recovery,
     scenarios,
+    searches,
     validation,
 )
 from mjspace.errors import print_warning
@@ -55,6 +58,9 @@ app.command()(models.new)
 app.command()(flights.run)
 app.command()(flights.replay)
 app.command()(campaigns.campaign)
+app.command()(searches.falsify)
+app.command()(margins.margins)
+app.command()(searches.tune)
 app.command()(pictures.render)
 app.command()(pictures.plot)
 app.command()(data.convert)

@@ -1,5 +1,6 @@
 """The command ``mjspace campaign``: a scenario flown many times, and how often it works."""
 
+import dataclasses
 import json
 import sys
 from enum import StrEnum
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mjspace.errors import InputError
+from mjspace.errors import InputError, printable
 from mjspace.terminal.options import Force, Json, Set, Traceback, Trust
 from mjspace.terminal.reporting import cause_shown, count_bar, progress_bar
 
@@ -98,3 +99,43 @@ def _one(
         report.print_result(result)
         print(f"log    {result.path}")
     raise typer.Exit(128 + result.signal if result.signal else not result.passed)
+
+
+def compare_campaigns(first: Path, second: Path, as_json: bool) -> None:
+    """Print what two campaigns on the same draws show."""
+    from mjspace.campaign.pairs import compare
+
+    pairs = compare(first, second)
+    if as_json:
+        derived = {name: getattr(pairs, name) for name in ("members", "difference", "probability")}
+        data = dataclasses.asdict(pairs) | derived | {"interval": list(pairs.interval)}
+        print(json.dumps(data, indent=2))
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    low, high = pairs.interval
+    percent = f"{100.0 * pairs.confidence:g} %"
+    console.print(
+        f"of {pairs.members} members {pairs.both} succeed in both, {pairs.first} in the first "
+        f"alone, {pairs.second} in the second alone, {pairs.neither} in neither"
+    )
+    console.print(
+        f"success rate of the second less the first's: {pairs.difference:+.4g}, {percent} interval "
+        f"{low:+.4g} to {high:+.4g}; by chance alone with probability {pairs.probability:.2g}"
+    )
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("margin of check")
+    for title in ("members", "better in the second", "median difference", f"{percent} interval"):
+        table.add_column(title, justify="right")
+    for check in pairs.checks:
+        table.add_row(
+            escape(printable(check.name)),
+            str(check.members),
+            f"{100.0 * check.better:.3g} %",
+            f"{check.difference:+.3g}",
+            f"{check.interval[0]:+.3g} to {check.interval[1]:+.3g}",
+        )
+    console.print(table)

@@ -1,4 +1,4 @@
-"""The commands ``mjspace convert`` and ``mjspace compare``: a log for other tools, and two logs."""
+"""The commands ``mjspace convert`` and ``mjspace compare``: logs for other tools, and in pairs."""
 
 import dataclasses
 import json
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mjspace.cli.campaigns import compare_campaigns
 from mjspace.errors import InputError, input_error_at
 from mjspace.terminal.options import Json, LogFile
 from mjspace.terminal.reporting import open_log, progress_bar
@@ -59,7 +60,16 @@ def compare(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Compare two logs, signal by signal, at the instants that both have."""
+    """Compare two logs, signal by signal, at the instants that both have.
+
+    Or two folders of campaigns on the same draws, as of two laws: which members succeed in one
+    alone, and by how much the margins differ.
+    """
+    if first.is_dir() and second.is_dir():
+        if signals or topics or tolerance or output is not None:
+            raise InputError("compare: of two campaigns, --json is the only option")
+        compare_campaigns(first, second, as_json)
+        return
     from mjspace.log.compare import compare as of_logs
 
     if not tolerance >= 0.0:

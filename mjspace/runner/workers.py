@@ -6,6 +6,8 @@ import warnings
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import partial
 from multiprocessing import (
     forkserver,
     get_all_start_methods,
@@ -61,33 +63,57 @@ def each(
     Raises:
         FlightError: one of the processes was killed.
     """
-    stop = stop or Stop()
-    warm_up(calls[0][0].__module__)
     cores = min(processes or os.cpu_count() or 1, len(calls))
+    with team(calls[0][0].__module__, stop, cores) as make:
+        yield from make(calls)
+
+
+@contextmanager
+def team(
+    module: str, stop: Stop | None = None, processes: int | None = None
+) -> Generator[Callable[..., Generator[tuple[int, Any], None, None]], None, None]:
+    """Yield a function that makes calls as ``each`` does, by the same processes each time.
+
+    ``module`` has the functions that are called.
+    """
+    stop = stop or Stop()
+    warm_up(module)
     theirs, ours = _CONTEXT.Pipe(duplex=False)
+    cores = processes or os.cpu_count() or 1
     with ours, ProcessPoolExecutor(cores, _CONTEXT, _begin, (theirs,)) as pool:
-        due: dict[Future[Any], int] = {}
         try:
-            with stop.breakable(at_once=True):  # the first waits until everything is imported
-                for index, (call, argument) in enumerate(calls):
-                    due[pool.submit(_make, call, argument)] = index
-            while due:
-                done, _ = wait(due, timeout=_LOOK, return_when=FIRST_COMPLETED)
-                for future in done:
-                    index = due.pop(future)
-                    for result in future.result():
-                        yield index, result
-                if stop() and not ours.closed:
-                    ours.close()
-                    due = {future: index for future, index in due.items() if not future.cancel()}
-        except BrokenProcessPool as error:
-            if not stop():
-                raise FlightError(
-                    "a process that flies was killed, as the system does for lack of memory"
-                ) from error
+            yield partial(_made, pool, ours, stop)
         finally:
             ours.close()
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _made(
+    pool: ProcessPoolExecutor,
+    ours: Connection,
+    stop: Stop,
+    calls: Sequence[tuple[Callable[..., _Result], Any]],
+) -> Generator[tuple[int, _Result], None, None]:
+    """Make calls in the ``pool``, which ends when ``ours`` is closed."""
+    due: dict[Future[Any], int] = {}
+    try:
+        with stop.breakable(at_once=True):  # the first waits until everything is imported
+            for index, (call, argument) in enumerate(calls):
+                due[pool.submit(_make, call, argument)] = index
+        while due:
+            done, _ = wait(due, timeout=_LOOK, return_when=FIRST_COMPLETED)
+            for future in done:
+                index = due.pop(future)
+                for result in future.result():
+                    yield index, result
+            if stop() and not ours.closed:
+                ours.close()
+                due = {future: index for future, index in due.items() if not future.cancel()}
+    except BrokenProcessPool as error:
+        if not stop():
+            raise FlightError(
+                "a process that flies was killed, as the system does for lack of memory"
+            ) from error
 
 
 def _make(call: Callable[..., _Result], argument: Any) -> list[_Result]:

@@ -61,10 +61,7 @@ class Dispersion(Table):
     @field_validator("key")
     @classmethod
     def _a_key(cls, key: str) -> str:
-        if re.fullmatch(r"[^\s.\[\]=]+(\.[^\s.\[\]=]+|\[\d+\])*", key) is None:
-            raise ValueError(f"got {key!r}, should be as 'plant.mass' or 'initial.rate[0]'")
-        if re.split(r"[.\[]", key)[0] in _NOT_FLOWN:
-            raise ValueError(f"{key!r} is no part of the flight")
+        path_of(key)
         return key
 
     @field_serializer("values")
@@ -101,7 +98,21 @@ class Dispersion(Table):
     @property
     def path(self) -> tuple[str, ...]:
         """The key's parts, an index as its digits."""
-        return tuple(re.split(r"[.\[]", self.key.replace("]", "")))
+        return path_of(self.key)
+
+
+def path_of(key: str) -> tuple[str, ...]:
+    """Return the parts of a scenario's ``key``, an index as its digits.
+
+    Raises:
+        ValueError: it is none, or of nothing that flies.
+    """
+    if re.fullmatch(r"[^\s.\[\]=]+(\.[^\s.\[\]=]+|\[\d+\])*", key) is None:
+        raise ValueError(f"got {key!r}, should be as 'plant.mass' or 'initial.rate[0]'")
+    path = tuple(re.split(r"[.\[]", key.replace("]", "")))
+    if path[0] in _NOT_FLOWN:
+        raise ValueError(f"{key!r} is no part of the flight")
+    return path
 
 
 def refuse_mode_outside(dispersion: Dispersion, mode: float | None) -> None:

@@ -129,9 +129,14 @@ class NativeBatch:
         """Call the C ``function`` at that address on each simulation, then save its state.
 
         Raises:
-            mujoco.batch.SimulationError: MuJoCo raised an error in some simulations.
+            mujoco.batch.SimulationError: MuJoCo raised an error in some simulations, or what the
+                function calls did, as a law's generalized ufunc may.
         """
-        failed = self._apply(self._batch, None, 0, function, argument, 1)
+        try:
+            failed = self._apply(self._batch, None, 0, function, argument, 1)
+        except SystemError as error:
+            everyone = np.arange(self.vehicles)
+            raise SimulationError(everyone, str(error.__cause__), self.vehicles) from error
         if failed:
             self._check(failed)
 

@@ -1,6 +1,5 @@
 """Campaigns flown: each member as alone, one table however it is divided, and resumed."""
 
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from mjspace.campaign.statistics import Gate
 from mjspace.campaign.store import WALL_TIME, Store
 from mjspace.errors import FlightError, InputError
 from mjspace.log.reader import Log
-from mjspace.runner import workers
 
 SCENARIO = """
 base = "detumble-wheels"
@@ -56,18 +54,6 @@ key = "law.rate_gain"
 distribution = "discrete"
 values = [5, 6]
 """
-
-
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let this process fly instead of others, which take seconds to begin."""
-
-    def each(calls: Sequence[Any], *_: Any) -> Iterator[tuple[int, Any]]:
-        # In another order than they are begun in, as processes may end.
-        for index, (call, argument) in reversed(list(enumerate(calls))):
-            yield index, call(argument)
-
-    monkeypatch.setattr(workers, "each", each)
 
 
 def scenario(folder: Path, text: str = SCENARIO) -> str:
@@ -221,11 +207,11 @@ def test_what_did_not_arrive_is_named(tmp_path: Path) -> None:
     assembly, drawn = everyone.member(1)
     for dispersion, value in zip(everyone.dispersions, drawn, strict=True):
         with pytest.raises(FlightError) as raised:
-            require_arrival(assembly, dispersion, value + 1e-9, 1)
+            require_arrival(assembly, dispersion, value + 1e-9, "member 1")
         assert f"dispersion {dispersion.key} did not arrive" in str(raised.value)
     moved = replace(assembly, qvel=np.zeros_like(assembly.qvel))
     with pytest.raises(FlightError, match=r"initial.rate\[0\] did not arrive"):
-        require_arrival(moved, everyone.dispersions[0], drawn[0], 1)
+        require_arrival(moved, everyone.dispersions[0], drawn[0], "member 1")
 
 
 @pytest.mark.parametrize(

@@ -474,6 +474,25 @@ def test_what_a_law_raises_ends_the_flight_as_in_python(tmp_path: Path) -> None:
     assert_same(compiled, python)
 
 
+def test_what_a_gufunc_raises_in_a_block_is_met_in_python(tmp_path: Path) -> None:
+    """As linear algebra does that meets no numbers: no exception may leave the native call."""
+    raising = """
+import numpy as np
+from mjspace.gufunc import gufunc
+
+@gufunc(["void(f8[:,:], f8[:])"], "(n,n)->()")
+def raising(matrix, least):
+    least[0] = np.linalg.eigvalsh(np.ascontiguousarray(matrix))[0]
+"""
+    trouble = "raising.ufunc(np.where(time > 0.0605, np.nan, 0.0) * np.eye(3))"
+    text = raising + HEAD.replace("{trouble}", f"torque = torque + {trouble}")
+    built = flying(text, tmp_path, "duration=0.2")
+    compiled, python = flown(built), flown(built, compiled=False)
+    assert "infs or NaNs" in python.trouble
+    assert "infs or NaNs" in compiled.compiled
+    assert_same(compiled, python)
+
+
 def test_an_error_of_mujoco_in_a_block_is_met_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     built = assembly("contraction-ideal", "duration=0.1")
     python, calls = flown(built, compiled=False), 0
