@@ -102,7 +102,8 @@ The factors of the gain are of what the wheels apply, those of the inertia of wh
 
 {remarks}
 """
-REMARKS = """- **Delay.** The linear loop (2 s + 1) / s^2 crosses over at 2.06 rad/s with a phase margin of 76
+REMARKS = """\
+- **Delay.** The linear loop (2 s + 1) / s^2 crosses over at 2.06 rad/s with a phase margin of 76
   deg: it is stable up to a delay of 0.65 s, less half of the control period. The laws come within a
   sixth of that.
 - **Sampling.** Laws with a filter or an observer of their own, as the adaptive contraction law and
