@@ -41,26 +41,35 @@ def render(
 
 def plot(
     log: LogFile,
-    output: Annotated[Path, typer.Option("-o", "--output", help="A PNG file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="x.png, x.pdf or x.svg.")],
     signals: Annotated[
         list[str],
         typer.Option("--signal", help="Plot this signal, as truth.rate[0]; repeatable."),
     ] = [],  # noqa: B006
+    topics: Annotated[
+        list[str], typer.Option("--topic", help="Plot all of this topic, as truth; repeatable.")
+    ] = [],  # noqa: B006
+    everything: Annotated[bool, typer.Option("--all", help="Plot every signal.")] = False,
     phase: Annotated[
         tuple[str, str] | None,
         typer.Option(metavar="X Y", help="Plot a phase plane: one signal against another."),
     ] = None,
 ) -> None:
-    """Plot a log to a PNG page."""
+    """Plot a log to a page: what matters of what flew, or the signals that are named."""
+    from mjspace.log.columns import select
     from mjspace.plotting import phase_plane
     from mjspace.plotting.page import plot as to_picture
 
-    if phase and signals:
-        raise InputError("--phase: is a picture of its own: leave --signal out")
-    open_log(log)
+    if phase and (signals or topics or everything):
+        raise InputError("--phase: is a picture of its own: leave --signal, --topic and --all out")
+    if everything and (signals or topics):
+        raise InputError("--all: plots every signal: leave --signal and --topic out")
+    opened = open_log(log)
     with input_error_at("plot"):
         if phase:
             phase_plane.plot(log, output, *phase)
-        else:
-            to_picture(log, output, signals=signals)
+            print(output)
+            return
+        named = [each.name for each in select(opened, (), topics)] if topics or everything else []
+        to_picture(log, output, signals=[*signals, *named])
     print(output)

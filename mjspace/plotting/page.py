@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from mjspace.errors import whole_or_none
 from mjspace.log.flown_scenario import scenario_of
@@ -20,27 +21,38 @@ from mjspace.plotting.style import COLORS, FAINT, INK, STYLE
 from mjspace.scenario.scenario import Scenario
 
 # Inches: the page's width and edges, a panel and the space around it, head and foot.
+COASTS = "coast:Coast"
+"""The law that commands nothing."""
+TIMES = (
+    ("days", 86400.0, 4 * 86400.0),
+    ("h", 3600.0, 3 * 3600.0),
+    ("min", 60.0, 600.0),
+    ("s", 1.0, 0.0),
+)
+"""Units of time in seconds, and the span from which on each is used."""
+FORMATS = (".png", ".pdf", ".svg")
 WIDTH, LEFT, RIGHT, PANEL, BETWEEN, HEAD, FOOT = 12.5, 0.7, 0.25, 1.75, 0.5, 1.05, 0.85
 
 
 def plot(log: Log | Path | str, output: Path | str, *, signals: Sequence[str] = ()) -> None:
-    """Write a log's page of plots as PNG: the standard one, or one panel for each of ``signals``.
+    """Write a log's page of plots: the standard one, or one panel for each of ``signals``.
 
     Signals are named as in a scenario's checks (``truth.rate[0]``); values are in the log's SI
-    units, angles in degrees and wheel speeds in rpm. The log is never loaded whole: a line has at
-    most some 4000 points, the extremes among them.
+    units with a prefix, angles in degrees and wheel speeds in rpm. The log is never loaded whole: a
+    line has at most some 4000 points, the extremes among them.
 
     Raises:
-        ValueError: ``output`` does not end in .png, no such signal, or not a log of mjspace.
+        ValueError: ``output`` does not end in .png, .pdf or .svg, no such signal, or not a log of
+            mjspace.
         OSError: a file cannot be read or written.
     """
     output = Path(output)
-    if output.suffix != ".png":
-        raise ValueError(f"output {str(output)!r}: end it in .png")
+    if output.suffix not in FORMATS:
+        raise ValueError(f"output {str(output)!r}: end it in {', '.join(FORMATS)}")
     with matplotlib.rc_context(STYLE):
         page = figure(log, signals)
         with whole_or_none(output) as file:
-            page.savefig(file, dpi=110, facecolor="white")
+            page.savefig(file, dpi=110, facecolor="white", format=output.suffix[1:])
 
 
 def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:
@@ -52,7 +64,8 @@ def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:
     """
     log = Log.of(log)
     scenario = scenario_of(log)
-    found = chosen(log, signals) if signals else curves(log)
+    coasting = scenario.law.kind == COASTS
+    found = chosen(log, signals) if signals else curves(log, coasting=coasting)
     warnings = [e.time for e in log.events() if e.level in ("WARNING", "ERROR", "FATAL")]
     rows = max(1, (len(found) + 1) // 2)
     height = HEAD + rows * (PANEL + BETWEEN) - BETWEEN + FOOT
@@ -73,25 +86,37 @@ def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:
         for bound in bounds(one.panel, scenario.checks, log):
             axes.margins(y=0.16)  # room for the bound's text
             _mark(axes, bound, colors[bound.component if one.panel.part is None else 0])
-        # Saturation, an early end, a check that failed: ticks along the bottom.
+        # Saturation, an early end, a check that failed: along the top, where no ticks are.
         axes.plot(
             warnings,
-            np.zeros(len(warnings)),
+            np.ones(len(warnings)),
             "|",
             color=COLORS[3],
             markersize=7,
             transform=axes.get_xaxis_transform(),
             clip_on=False,
         )
-    if log.end > log.start:
-        grid.flat[0].set_xlim(log.start, log.end)
+    unit = _scale_time(grid.flat[0], log)
     for axes in grid.flat[len(found) :]:
         axes.set_axis_off()
     for axes in grid.flat[max(len(found) - 2, 0) : len(found)]:
         axes.tick_params(labelbottom=True)
-        axes.set_xlabel("time [s]")
+        axes.set_xlabel(f"time [{unit}]")
     _caption(page, scenario, log, height)
     return page
+
+
+def _scale_time(axes: Any, log: Log) -> str:
+    """Set the limits and the ticks of an axis of time, and return its unit."""
+    span = log.end - log.start
+    unit, seconds = next(each for each in TIMES if span >= each[2])[:2]
+    if span > 0.0:
+        axes.set_xlim(log.start, log.end)
+        round_numbers = MaxNLocator(8, steps=[1, 2, 2.5, 3, 5, 6, 10])
+        ticks = round_numbers.tick_values(log.start / seconds, log.end / seconds)
+        axes.xaxis.set_major_locator(FixedLocator([seconds * tick for tick in ticks]))
+        axes.xaxis.set_major_formatter(lambda value, _: _short(value / seconds))
+    return str(unit)
 
 
 def _colors(one: Curves) -> list[str]:
@@ -101,6 +126,9 @@ def _colors(one: Curves) -> list[str]:
 
 def _draw(axes: Any, one: Curves, colors: Sequence[str]) -> None:
     panel, count = one.panel, len(colors)
+    if panel.lanes:
+        _draw_lanes(axes, one)
+        return
     for i, (name, color) in enumerate(zip(panel.names or range(count), colors, strict=True)):
         axes.plot(one.time[:, i], one.value[:, i], color=color, label=str(name))
         if one.desired is not None and one.desired_time is not None:
@@ -131,6 +159,17 @@ def _draw(axes: Any, one: Curves, colors: Sequence[str]) -> None:
             borderpad=0.1,
             fontsize=8,
         )
+
+
+def _draw_lanes(axes: Any, one: Curves) -> None:
+    """Draw each component in a lane: its part of the largest value of all."""
+    count, largest = one.value.shape[1], float(np.max(np.abs(one.value))) or 1.0
+    for i in range(count):
+        height = 0.8 * one.value[:, i] / largest
+        axes.fill_between(one.time[:, i], i, i + height, step="post", color=INK, lw=0.0)
+    axes.set_ylim(-0.2, count)
+    axes.set_yticks(range(0, count, max(1, count // 6)))
+    axes.set_title(one.panel.title, loc="left", fontweight="bold", fontsize=9.5)
 
 
 def _short(value: float) -> str:

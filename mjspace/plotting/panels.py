@@ -1,6 +1,6 @@
 """The panels of a page: one for each signal that has something to show."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,11 @@ DECLARED = topics.units()
 NO_UNIT = Unit("")
 DESIRED_RATE = "/reference", "rate"
 LAW_PANELS = 4
+MOST = 12
+"""Panels on the standard page."""
+PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
+_PREFIXED = {"m", "m/s", "N", "N m", "N m s", "W", "J", "T", "A", "A m^2", "V"}
+"""Units that take them."""
 _CLOSED = "_closed"
 """Ending of the field that tells whether a connection is closed."""
 
@@ -38,16 +43,22 @@ class Panel:
     """Drawn is the norm of the change since the first row."""
     desired: tuple[str, str] | None = None
     """Topic and field of its desired value."""
+    needs: tuple[str, str] | None = None
+    """Topic and field of another signal without which it shows nothing of interest."""
+    lanes: bool = False
+    """Each component is drawn in a lane of its own, of the height of the largest value of all."""
+    prefix: str = ""
+    """Before the unit; ``read`` chooses it by the largest value."""
 
     @property
     def unit(self) -> str:
         """Of the drawn values."""
-        return self.quantity.displayed[0]
+        return self.prefix + self.quantity.displayed[0]
 
     @property
     def scale(self) -> float:
         """Factor from SI to ``unit``."""
-        return self.quantity.displayed[1]
+        return self.quantity.displayed[1] / PREFIXES[self.prefix]
 
 
 @dataclass(frozen=True)
@@ -61,9 +72,18 @@ class Curves:
     desired: Array | None = None
 
 
-STANDARD = (
+_GROUND = "/truth", "altitude"
+TRANSLATION = (
+    Panel("Height above the ground", *_GROUND),
+    Panel("Velocity", "/truth", "velocity", names="xyz", needs=_GROUND),
+    Panel("Position", "/truth", "position", names="xyz", desired=("/reference", "position")),
+)
+ROTATION = (
     Panel("Attitude error", "/truth", "attitude_error", log_scale=True),
     Panel("Body rate", "/truth", "rate", names="xyz", desired=DESIRED_RATE),
+)
+STANDARD = (
+    Panel("Propellant", "/truth", "propellant"),
     Panel("Commanded torque on the bus", "/command", "torque", names="xyz"),
     Panel("Wheel motor torque", "/command", "wheel_torque"),
     Panel("Motor torque", "/command", "motor_torque"),
@@ -74,6 +94,7 @@ STANDARD = (
     Panel("Momentum margin of wheels", "/truth", "wheel_momentum_margin"),
     Panel("Electrical power of wheels", "/truth", "wheel_power"),
     Panel("Electrical energy of wheels", "/truth", "wheel_energy"),
+    Panel("Visible part of the Sun", "/truth", "sunlight"),
     Panel("Change of total momentum", "/truth", "momentum", log_scale=True, drift=True),
     Panel("Disturbance torque about the centre of mass", "/disturbance", "torque", names="xyz"),
 )
@@ -81,26 +102,46 @@ OF_PARTS = {"deflection": "Tip deflection of", "displacement": "Displacement of 
 """Titles, before the part's name, of the fields of /truth that end so."""
 
 
-def curves(log: Log) -> list[Curves]:
+def curves(log: Log, *, coasting: bool = False) -> list[Curves]:
     """Return the curves of the standard page: its signals, how parts move, and the law's signals.
 
-    Of the law's they are the first that change. A signal that is zero throughout is left out, and
-    so is one of the law's that never changes.
+    They are at most ``MOST``, the law's last: of those the first that change. A signal that is zero
+    throughout is left out, and so is one of the law's that never changes. Of a ``coasting`` vehicle
+    the attitude error says nothing.
     """
+    first = (*TRANSLATION, *_of_thrust(log), *ROTATION, *_of_connections(log), *_of_parts(log))
     standard = [
         panel
-        for panel in (*STANDARD, *_of_connections(log))
-        if log.topics.get(panel.topic, {}).get(panel.field, (0,)) != (0,)
+        for panel in (*first, *STANDARD)
+        if _has(log, panel.topic, panel.field)
+        and (panel.needs is None or _has(log, *panel.needs))
+        and not (panel.field == "position" and not _has(log, "/reference", "position"))
+        and not (coasting and panel.field == "attitude_error")
     ]
-    for field in log.topics.get("/truth", {}):
-        part, _, what = field.rpartition("_")
-        if what in OF_PARTS:
-            standard.append(Panel(f"{OF_PARTS[what]} {part}", "/truth", field))
     law = [_of_signal(log, f"law.{field}") for field in log.topics.get("/law", {})]
     found = read(log, [*standard, *law])
     shown = [one for one in found[: len(standard)] if one.value.any()]
     changing = [one for one in found[len(standard) :] if np.ptp(one.value, axis=0).any()]
-    return [*shown, *changing[:LAW_PANELS]]
+    return [*shown, *changing[:LAW_PANELS]][:MOST]
+
+
+def _has(log: Log, topic: str, field: str) -> bool:
+    return log.topics.get(topic, {}).get(field, (0,)) != (0,)
+
+
+def _of_thrust(log: Log) -> list[Panel]:
+    """Return the panel of the engine's thrust, and that of when each thruster fires."""
+    commanded = log.topics.get("/command", {})
+    firing = next((name for name in ("on_time", "thruster_thrust") if name in commanded), None)
+    thrusters = commanded[firing][0] if firing else 0
+    (count,) = log.topics["/truth"].get("thrust", (0,))
+    found = []
+    if count > thrusters:
+        part = slice(0, count - thrusters)
+        found.append(Panel("Thrust of the engine", "/truth", "thrust", part=part))
+    if firing:
+        found.append(Panel("Firings of thrusters", "/command", firing, lanes=True))
+    return found
 
 
 def _of_connections(log: Log) -> list[Panel]:
@@ -115,6 +156,14 @@ def _of_connections(log: Log) -> list[Panel]:
         for name in names
         for what in ("position", "velocity")
     ]
+
+
+def _of_parts(log: Log) -> Iterator[Panel]:
+    """Yield the panel of how each moving part is bent or displaced."""
+    for field in log.topics.get("/truth", {}):
+        part, _, what = field.rpartition("_")
+        if what in OF_PARTS:
+            yield Panel(f"{OF_PARTS[what]} {part}", "/truth", field)
 
 
 def chosen(log: Log, signals: Sequence[str]) -> list[Curves]:
@@ -136,9 +185,26 @@ def read(log: Log, panels: Sequence[Panel]) -> list[Curves]:
             lines[number, "desired"] = Line(*panel.desired, _change(panel))
     found = dict(zip(lines, outlines(log, list(lines.values())), strict=True))
     return [
-        Curves(panel, *found[number, "value"], *found.get((number, "desired"), ()))
+        _prefixed(Curves(panel, *found[number, "value"], *found.get((number, "desired"), ())))
         for number, panel in enumerate(panels)
     ]
+
+
+def _prefixed(curves: Curves) -> Curves:
+    """Return the curves with a prefix before their unit where numbers are very small or large."""
+    panel = curves.panel
+    largest = float(np.nanmax(np.abs(curves.value), initial=0.0))
+    if panel.unit not in _PREFIXED or panel.log_scale or not 0.0 < largest < np.inf:
+        return curves
+    if 1e-2 <= largest < 1e4:
+        return curves
+    fitting = [prefix for prefix, factor in PREFIXES.items() if factor <= largest]
+    prefix = fitting[-1] if fitting else "n"
+    factor = PREFIXES[prefix]
+    desired = None if curves.desired is None else curves.desired / factor
+    return replace(
+        curves, panel=replace(panel, prefix=prefix), value=curves.value / factor, desired=desired
+    )
 
 
 def _change(panel: Panel) -> Callable[[Array], Array]:

@@ -15,12 +15,12 @@ from mjspace.plotting import decimate
 from mjspace.plotting.check_bounds import Bound, bounds
 from mjspace.plotting.decimate import Line, outlines
 from mjspace.plotting.page import _short, figure, plot
-from mjspace.plotting.panels import LAW_PANELS, STANDARD, Panel, curves, read
+from mjspace.plotting.panels import LAW_PANELS, MOST, ROTATION, STANDARD, Panel, curves, read
 from mjspace.runner.run import run
 from mjspace.scenario.scenario import Check
 
 ERROR, RATE, SPEED, MOMENTUM = (
-    next(panel for panel in STANDARD if panel.field == field)
+    next(panel for panel in (*ROTATION, *STANDARD) if panel.field == field)
     for field in ("attitude_error", "rate", "wheel_speed", "momentum")
 )
 
@@ -57,7 +57,7 @@ def test_the_page_has_every_panel(page: Figure, log: Log) -> None:
 
 def test_what_is_zero_throughout_is_left_out(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
     force = Panel("Force", "/disturbance", "force")  # the bus stands where tides are zero
-    monkeypatch.setattr("mjspace.plotting.panels.STANDARD", (force, RATE))
+    monkeypatch.setattr("mjspace.plotting.panels.ROTATION", (force, RATE))
     assert titles(figure(log))[0] == "Body rate [deg/s]"
 
 
@@ -285,8 +285,8 @@ def test_a_link_is_not_followed(linked: Any, pictured_log: Path, tmp_path: Path)
 
 
 def test_bad_input_is_refused(pictured_log: Path, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"end it in \.png"):
-        plot(pictured_log, tmp_path / "x.pdf")
+    with pytest.raises(ValueError, match=r"end it in \.png, \.pdf, \.svg"):
+        plot(pictured_log, tmp_path / "x.jpg")
     with pytest.raises(ValueError, match=r"truth\.rate"):
         plot(pictured_log, tmp_path / "x.png", signals=["truth.rates"])
 
@@ -303,5 +303,67 @@ def test_moving_parts_have_panels_by_their_names(tmp_path: Path) -> None:
     short = ["duration=1.2", "checks=[]", tank, "initial.joint_position={tank_slide_x=0.01}"]
     log = run("flexible-bang-bang", overrides=short, out=tmp_path / "it").log
     shown = titles(figure(log))
-    assert "Tip deflection of left [m]" in shown
+    assert "Tip deflection of left [mm]" in shown
     assert "Displacement of what sloshes in tank [m]" in shown
+
+
+@pytest.mark.parametrize(("ending", "begin"), [("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_pages_are_drawings_too(
+    ending: str, begin: bytes, pictured_log: Path, tmp_path: Path
+) -> None:
+    plot(pictured_log, tmp_path / f"x.{ending}", signals=["truth.rate"])
+    assert (tmp_path / f"x.{ending}").read_bytes().startswith(begin)
+
+
+def test_a_page_of_a_lander_shows_where_it_is_and_what_it_burns(tmp_path: Path) -> None:
+    short = ["duration=2", "checks=[]"]
+    shown = titles(figure(run("lander", overrides=short, out=tmp_path / "it").log))
+    assert shown[:4] == [
+        "Height above the ground [m]",
+        "Velocity [m/s]",
+        "Position [m]",
+        "Thrust of the engine [N]",
+    ]
+    assert "Propellant [kg]" in shown
+    assert len(shown) == MOST
+
+
+def test_firings_stand_in_a_lane_for_each_thruster(tmp_path: Path) -> None:
+    log = run("rcs-three-axis", overrides=["duration=4", "checks=[]"], out=tmp_path / "it").log
+    page = figure(log)
+    (lanes,) = (axes for axes in page.axes if axes.get_title(loc="left") == "Firings of thrusters")
+    on_time = log.read("/command", ["on_time"])["on_time"]
+    assert len(lanes.collections) == on_time.shape[1] == 12
+    assert on_time.any()
+    for number, lane in enumerate(lanes.collections):
+        highest = max(np.asarray(path.vertices)[:, 1].max() for path in lane.get_paths())
+        fired = on_time[:, number].max() / on_time.max()
+        assert highest == pytest.approx(number + 0.8 * fired)
+
+
+def test_small_numbers_have_a_prefix(log: Log, tmp_path: Path) -> None:
+    weak = ["duration=1", "checks=[]", "environment.torques=[{bias=[2e-7,0,0]}]"]
+    page = figure(run("lqr-regulation", overrides=weak, out=tmp_path / "it").log)
+    (axes,) = (a for a in page.axes if a.get_title(loc="left").startswith("Disturbance"))
+    assert axes.get_title(loc="left") == "Disturbance torque about the centre of mass [nN m]"
+    assert np.max(axes.lines[0].get_ydata()) == pytest.approx(200.0)
+    (speed,) = read(log, [SPEED])
+    assert speed.panel.unit == "rpm"  # which takes none
+
+
+@pytest.mark.parametrize(
+    ("duration", "unit", "last"), [(2.0, "s", "2"), (1200.0, "min", "20"), (36000.0, "h", "10")]
+)
+def test_time_is_in_the_unit_of_the_flight(
+    duration: float, unit: str, last: str, tmp_path: Path
+) -> None:
+    step = f"rates={{physics={duration / 100},control={duration / 100}}}"
+    still = ["initial.rate=[0,0,0]", "initial.wheel_speed=[0,0,0]", "law={kind='coast:Coast'}"]
+    slow = [f"duration={duration}", "checks=[]", step, *still]
+    page = figure(run("detumble-wheels", overrides=slow, out=tmp_path / "it").log)
+    shown = [axes for axes in page.axes if axes.axison and axes.get_title(loc="left")]
+    page.canvas.draw()
+    labels = [label.get_text() for label in page.axes[0].get_xticklabels()]
+    assert last in labels
+    assert {axes.get_xlabel() for axes in shown} <= {f"time [{unit}]", ""}
+    assert not any(title.startswith("Attitude error") for title in titles(page))  # it coasts
