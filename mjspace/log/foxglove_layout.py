@@ -1,17 +1,39 @@
-"""The layout attached to each log: a 3D view and the plots one looks at first, for Foxglove."""
+"""The layout attached to each log, for Foxglove and Lichtblick: a 3D view, plots of what flew."""
 
 import json
+import math
+from collections.abc import Iterator, Mapping
 
-_PLOTS = {
-    "Attitude error": ["/truth.attitude_error"],
-    "Rate": [f"/truth.rate[{i}]" for i in range(3)],
-    "Wheel speed": [f"/truth.wheel_speed[{i}]" for i in range(3)],
-    "Commanded torque": [f"/command.torque[{i}]" for i in range(3)],
-}
+Topics = Mapping[str, Mapping[str, tuple[int, ...]]]
+
+SIGNALS = (
+    ("Height above the ground", "/truth", "altitude"),
+    ("Velocity", "/truth", "velocity"),
+    ("Thrust", "/truth", "thrust"),
+    ("Propellant", "/truth", "propellant"),
+    ("Attitude error", "/truth", "attitude_error"),
+    ("Body rate", "/truth", "rate"),
+    ("Commanded torque", "/command", "torque"),
+    ("Wheel speed", "/truth", "wheel_speed"),
+    ("Gimbal angle", "/truth", "gimbal_angle"),
+    ("Gimbal rate", "/command", "gimbal_rate"),
+    ("Thrusters on", "/command", "on_time"),
+    ("Magnetic moment", "/command", "magnetic_moment"),
+    ("Motor torque", "/command", "motor_torque"),
+    ("Joint torque", "/command", "applied_joint_torque"),
+)
+"""Title, topic and field of what is plotted, if it is in the log, the first before the others."""
+MOST = 8
+"""Plots."""
+_ONLY_ON_GROUND = {"velocity"}
+_CURVES = 12  # in a plot
 
 
-def layout(bus: str) -> bytes:
-    """Return the layout as Foxglove and Lichtblick import it; the view follows the body ``bus``."""
+def layout(bus: str, topics: Topics) -> bytes:
+    """Return the layout as both import it; the view follows the body ``bus``.
+
+    ``topics`` are the fields and their shapes by topic.
+    """
     configs: dict[str, object] = {
         "3D!scene": {
             "followTf": bus,
@@ -20,19 +42,49 @@ def layout(bus: str) -> bytes:
         }
     }
     plots = []
-    for i, (title, paths) in enumerate(_PLOTS.items()):
-        plots.append(f"Plot!{i}")
-        configs[plots[i]] = {
+    for number, (title, paths) in enumerate(_plots(topics)):
+        plots.append(f"Plot!{number}")
+        configs[plots[-1]] = {
             "foxglovePanelTitle": title,
             "paths": [
-                {"value": p, "enabled": True, "timestampMethod": "receiveTime"} for p in paths
+                {"value": path, "enabled": True, "timestampMethod": "receiveTime"} for path in paths
             ],
         }
-    column = {"first": _pair(*plots[:2]), "second": _pair(*plots[2:]), "direction": "column"}
-    tree = {"first": "3D!scene", "second": column, "direction": "row", "splitPercentage": 50}
+    half = (len(plots) + 1) // 2
+    tree: object = "3D!scene"
+    for column, share in ((plots[:half], 40), (plots[half:], 60)):
+        if column:
+            tree = {
+                "first": tree,
+                "second": _stack(column),
+                "direction": "row",
+                "splitPercentage": share,
+            }
     whole = {"configById": configs, "globalVariables": {}, "userNodes": {}, "layout": tree}
     return json.dumps(whole, indent=1).encode()
 
 
-def _pair(first: str, second: str) -> dict[str, str]:
-    return {"first": first, "second": second, "direction": "column"}
+def _plots(topics: Topics) -> Iterator[tuple[str, list[str]]]:
+    """Yield the title and the message paths of each plot."""
+    left = MOST
+    on_ground = "altitude" in topics.get("/truth", {})
+    for title, topic, field in SIGNALS:
+        count = math.prod(topics.get(topic, {}).get(field, (0,)))
+        if not count or not left or (field in _ONLY_ON_GROUND and not on_ground):
+            continue
+        left -= 1
+        path = f"{topic}.{field}"
+        single = topics[topic][field] in ((), (1,))
+        yield title, [path] if single else [f"{path}[{i}]" for i in range(min(count, _CURVES))]
+
+
+def _stack(panels: list[str]) -> object:
+    """Return the panels one below the other, of equal heights."""
+    if len(panels) == 1:
+        return panels[0]
+    return {
+        "first": panels[0],
+        "second": _stack(panels[1:]),
+        "direction": "column",
+        "splitPercentage": 100.0 / len(panels),
+    }

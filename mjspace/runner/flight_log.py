@@ -63,10 +63,11 @@ class FlightLog:
         """Time (1,) [s] and state (1, nstate) of the last period, unless its frames are logged."""
         bus = self._model.body(bus_id(self._model)).name
         compiled, drawn = described(self._model)
+        topics = shapes(first)
         attachments = {
             "model.mjb.gz": ("application/gzip", compiled),
             "scenario.toml": ("application/toml", to_toml(scenario).encode()),
-            "foxglove_layout.json": ("application/json", foxglove_layout.layout(bus)),
+            "foxglove_layout.json": ("application/json", foxglove_layout.layout(bus, topics)),
         }
         for name, content in assembly.sources.items():
             is_code = name.endswith(".py")
@@ -74,7 +75,7 @@ class FlightLog:
             attachments[name] = (media_type, content)
         self._log = LogWriter(
             path,
-            shapes(first),
+            topics,
             provenance.metadata(scenario, compiled, member),
             attachments,
             drawn,

@@ -14,9 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mjspace.contract import Array
-from mjspace.log.foxglove_layout import layout
+from mjspace.log.foxglove_layout import MOST, SIGNALS, layout
 from mjspace.log.scene import scene
-from mjspace.log.schema import PERIODIC
 
 TETRAHEDRON = "0 0 0  1 0 0  0 1 0  0 0 1"
 MODEL = f"""
@@ -205,14 +204,76 @@ def test_urdf_angles_are_the_geoms_orientation(angles: tuple[float, ...]) -> Non
     np.testing.assert_allclose(built, matrix.reshape(3, 3), atol=1e-14)
 
 
-def test_the_layout_shows_topics_of_the_log() -> None:
-    whole = json.loads(layout("hub"))
-    assert {panel.partition("!")[0] for panel in whole["configById"]} == {"3D", "Plot"}
-    paths = re.findall(r'"value": "(/\w+)\.(\w+)', layout("hub").decode())
-    assert {("/truth", "attitude_error"), ("/truth", "rate"), ("/truth", "wheel_speed")} <= set(
-        paths
-    )
-    assert ("/command", "torque") in paths
-    assert {topic for topic, _ in paths} <= set(PERIODIC)
+SATELLITE = {
+    "/truth": {"attitude_error": (1,), "rate": (3,), "wheel_speed": (4,), "velocity": (3,)},
+    "/command": {"torque": (3,)},
+}
+LANDER = {
+    "/truth": {"altitude": (1,), "velocity": (3,), "thrust": (1,), "wheel_speed": (0,)},
+    "/command": {"on_time": (28,)},
+}
+
+
+def paths_of(topics: Any) -> list[str]:
+    found = layout("hub", topics).decode()
+    whole = json.loads(found)
     panels = re.findall(r"(?:3D|Plot)!\w+", json.dumps(whole["layout"]))
     assert sorted(panels) == sorted(whole["configById"])
+    return re.findall(r'"value": "([^"]+)"', found)
+
+
+def test_the_layout_shows_what_flew() -> None:
+    assert paths_of(SATELLITE) == [
+        "/truth.attitude_error",
+        *(f"/truth.rate[{i}]" for i in range(3)),
+        *(f"/command.torque[{i}]" for i in range(3)),
+        *(f"/truth.wheel_speed[{i}]" for i in range(4)),
+    ]
+    lander = paths_of(LANDER)
+    assert lander[:2] == ["/truth.altitude", "/truth.velocity[0]"]
+    assert sum(path.startswith("/command.on_time") for path in lander) == 12
+    assert not any("wheel" in path for path in lander)
+    assert paths_of({}) == []
+
+
+def test_at_most_eight_plots_stand_beside_the_picture() -> None:
+    every: dict[str, dict[str, tuple[int, ...]]] = {"/truth": {"altitude": (1,)}}
+    for _, topic, field in SIGNALS:
+        every.setdefault(topic, {})[field] = (1,)
+    assert len(paths_of(every)) == MOST
+
+
+def test_textures_have_their_mean_color_and_scenery_is_left_out() -> None:
+    model = mujoco.MjModel.from_xml_string("""
+<mujoco>
+  <asset>
+    <texture name="half" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1"
+             width="8" height="8"/>
+    <material name="half" texture="half" rgba="0.5 1 1 0.75"/>
+    <hfield name="hill" nrow="2" ncol="3" size="4 6 0.5 1" elevation="0 1 0 0 0 1"/>
+  </asset>
+  <worldbody>
+    <geom type="plane" size="5 0 1" material="half"/>
+    <geom type="hfield" hfield="hill" pos="0 0 1"/>
+    <geom type="sphere" size="1000" pos="29000 0 0"/>
+  </worldbody>
+</mujoco>""")
+    (world,) = SceneUpdate.FromString(scene(model).update).entities
+    assert not world.spheres
+    (plane,) = world.cubes
+    color = plane.color
+    assert [color.r, color.g, color.b, color.a] == pytest.approx([0.25, 0.0, 0.5, 0.75], abs=2e-3)
+    assert [plane.size.x, plane.size.y] == [10.0, 200.0]
+    assert plane.pose.position.z == pytest.approx(-plane.size.z / 2.0)  # its top is the plane
+    (hill,) = world.triangles
+    points = np.array([[p.x, p.y, p.z] for p in hill.points])
+    right = [[-4, -6, 0], [0, -6, 0], [4, -6, 0.5], [-4, 6, 0], [0, 6, 0.5], [4, 6, 0]]
+    assert np.allclose(points, right)
+    data, hit = mujoco.MjData(model), np.zeros(1, np.int32)
+    mujoco.mj_forward(model, data)
+    above = np.array([3.99, -5.99, 11.0]), np.array([0.0, 0.0, -1.0])
+    assert mujoco.mj_ray(model, data, *above, None, 1, -1, hit) == pytest.approx(9.5, abs=0.01)
+    corners = points[np.array(hill.indices).reshape(-1, 3)]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (normals[:, 2] > 0.0).all()
+    assert normals[:, 2].sum() / 2.0 == pytest.approx(8.0 * 12.0)  # its triangles cover it
