@@ -83,8 +83,9 @@ def _laws() -> list[str]:
 A gain without a default must be set, but for `inertia`, `wheel_axes`, `wheel_inertia`,
 `control_period` and `inner_period` (the integration step): left out, they are those of the
 vehicle and the scenario as flown. Those that point by the orbit are handed the ephemeris of the
-scenario's environment. Every number of a gain is finite but where `inf`, no limit, is in
-its range. Arrays may come from a CSV file: `file = "turn.csv"`, with a header that names the gains
+scenario's environment: see [pointing](references.md). Every number of a gain is finite but where
+`inf`, no limit, is in its range. Arrays may come from a CSV file: `file = "turn.csv"`, with a
+header that names the gains
 (`time,attitude0,attitude1,attitude2,attitude3`).
 
 A law in a file of your own may import modules beside it, at the top of the file, and read data
