@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import cached_property, partial
 from typing import Any
 
@@ -91,15 +92,19 @@ class KnownEphemeris:
     def _sun(self) -> "_Interpolant":
         from mjspace.environment import sun  # which imports ERFA
 
-        assert self.environment.epoch is not None
-        return _Interpolant(partial(sun.position, self.environment.epoch), _DAY)
+        return _Interpolant(partial(sun.position, self._epoch), _DAY)
 
     @cached_property
     def _sidereal_angle(self) -> float:
         from mjspace.environment.geomagnetism import sidereal_angle  # which reads IGRF
 
-        assert self.environment.epoch is not None
-        return sidereal_angle(self.environment.epoch)
+        return sidereal_angle(self._epoch)
+
+    @property
+    def _epoch(self) -> datetime:
+        epoch = self.environment.epoch
+        assert epoch is not None  # where it has a Sun
+        return epoch
 
 
 @compiled

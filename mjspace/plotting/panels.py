@@ -9,6 +9,7 @@ from mjspace.contract import Array
 from mjspace.log import topics
 from mjspace.log.reader import Log
 from mjspace.plotting.decimate import Line, outlines
+from mjspace.scenario.boresight import ANGLES
 from mjspace.signals import find_signal
 from mjspace.units import Unit
 
@@ -96,6 +97,10 @@ def curves(log: Log) -> list[Curves]:
         part, _, what = field.rpartition("_")
         if what in OF_PARTS:
             standard.append(Panel(f"{OF_PARTS[what]} {part}", "/truth", field))
+        for angle, name in ANGLES.items():
+            if field.endswith(f"_{angle}"):
+                boresight = field.removesuffix(f"_{angle}")
+                standard.append(Panel(f"Angle of {boresight} from {name}", "/truth", field))
     law = [_of_signal(log, f"law.{field}") for field in log.topics.get("/law", {})]
     found = read(log, [*standard, *law])
     shown = [one for one in found[: len(standard)] if one.value.any()]

@@ -12,9 +12,9 @@ from mjspace.log.rows import due
 from mjspace.log.scene import scene
 from mjspace.log.schema import Scene
 from mjspace.log.writer import LogWriter
+from mjspace.scenario.boresight import ANGLES
 from mjspace.scenario.loading import to_toml
 from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.boresights import ANGLES
 from mjspace.simulation.recording import Block, one_vehicle, shapes
 from mjspace.units import Unit
 from mjspace.vehicle import vehicle

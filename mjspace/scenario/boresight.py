@@ -2,6 +2,9 @@
 
 from mjspace.scenario.fields import Table, Unit3
 
+ANGLES = {"nadir_angle": "nadir", "limb_angle": "the planet's limb", "sun_angle": "the Sun"}
+"""What /truth has of each boresight [rad], after its name and an underscore, and from what."""
+
 
 class Boresight(Table):
     """Where an instrument fixed to the bus looks.

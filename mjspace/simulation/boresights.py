@@ -11,9 +11,6 @@ from mjspace.scenario.boresight import Boresight
 from mjspace.scenario.environment import Environment
 from mjspace.sensors.base import Motion
 
-ANGLES = ("nadir_angle", "limb_angle", "sun_angle")
-"""What /truth has of each boresight [rad], after its name and an underscore."""
-
 
 def angles_at(
     motion: Motion,

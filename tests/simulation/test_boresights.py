@@ -9,6 +9,7 @@ from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.environment.orbit import orbit_position
 from mjspace.errors import InputError
+from mjspace.plotting.panels import curves
 from mjspace.runner.run import run
 from mjspace.scenario.loading import load
 
@@ -42,6 +43,8 @@ def test_angles_are_those_of_the_geometry(tmp_path: Path) -> None:
     np.testing.assert_allclose(told, begins, atol=1e-9)
     assert len(told) == 1
     assert result.log.units["/truth"]["camera_sun_angle"] == "rad"
+    titles = [curve.panel.title for curve in curves(result.log)]
+    assert "Angle of tracker from the planet's limb" in titles
 
 
 def test_without_an_epoch_nothing_is_said_of_the_sun(tmp_path: Path) -> None:

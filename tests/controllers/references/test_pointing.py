@@ -131,6 +131,12 @@ def test_yaw_steering_turns_no_faster_than_its_limit(node: float, limit: float) 
         assert np.abs(sun[elsewhere, 1]).max() < 4.0 * narrow**3
 
 
+def test_yaw_steering_in_an_eccentric_orbit_is_a_little_faster() -> None:
+    known, times = ephemeris("eccentric", ascending_node=2.0), np.linspace(0.0, 13000.0, 13001)
+    yaw_rate = YawSteering(known, 0.01).at(times).rate - Nadir(known).at(times).rate
+    assert np.abs(yaw_rate[:, 2]).max() < 0.0103
+
+
 def test_yaw_steering_has_the_sun_in_its_plane_where_no_limit_matters() -> None:
     known = ephemeris("inclined")
     source = YawSteering(known, 1e3)
