@@ -30,9 +30,9 @@ def ephemeris(orbit: str, **changes: Any) -> KnownEphemeris:
 
 
 def agreement(source: Any, times: Array, step: float) -> tuple[float, float]:
-    """Return by how much the rate [rad/s] differs from the attitude's derivative, at most, and
+    """Return the largest errors of the rate [rad/s] and the acceleration [rad/s^2].
 
-    the acceleration [rad/s^2] from the rate's: central differences of the eighth order.
+    Against central differences of the eighth order, of the attitude and of the rate.
     """
     factors = np.array([4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0])
     now = source.at(times)

@@ -14,10 +14,10 @@ EQUATOR, FLATTENING = 6378137.0, 1.0 / 298.257223563
 
 
 def geodetic(latitude: float, longitude: float, height: float) -> Array:
-    """Return a place (3,) [m] in Earth-fixed axes from its latitude and longitude [rad], height [m]
+    """Return the place (3,) [m], Earth-fixed axes, at a geodetic latitude and longitude [rad].
 
-    above the ellipsoid of WGS 84 (Vallado 2013, Fundamentals of Astrodynamics and Applications,
-    4th edition, section 3.2.2).
+    Its ``height`` [m] is above the ellipsoid of WGS 84 (Vallado 2013, Fundamentals of Astrodynamics
+    and Applications, 4th edition, section 3.2.2).
     """
     square = FLATTENING * (2.0 - FLATTENING)  # of the eccentricity
     sine, cosine = np.sin(latitude), np.cos(latitude)
