@@ -200,6 +200,37 @@ DesiredMotion = Reference | Trajectory
 """What a law is to follow."""
 
 
+class Path(NamedTuple):
+    """How a point moves, inertial axes: its position and three time derivatives."""
+
+    position: Annotated[Array, Unit("m")]
+    """[m], shape (n, 3)."""
+    velocity: Annotated[Array, Unit("m/s")]
+    """[m/s], shape (n, 3)."""
+    acceleration: Annotated[Array, Unit("m/s^2")]
+    """[m/s^2], shape (n, 3)."""
+    jerk: Annotated[Array, Unit("m/s^3")]
+    """[m/s^3], shape (n, 3)."""
+
+
+class Ephemeris(Protocol):
+    """What is known beforehand of the orbit, the Sun and the Earth, from the planet's centre.
+
+    A reference that has a parameter ``ephemeris`` is handed that of the scenario's environment.
+    Each method takes times [s] of shape (n,), and raises a ValueError that names what the scenario
+    would have to say.
+    """
+
+    def origin(self, time: Array) -> Path:
+        """Return the motion of the frame's origin, which falls along the orbit."""
+
+    def sun(self, time: Array) -> Path:
+        """Return the motion of the Sun, as seen from the Earth's centre."""
+
+    def fixed_to_earth(self, place: Array, time: Array) -> Path:
+        """Return the motion of a ``place`` (3,) [m] in Earth-fixed axes, z along the Earth's."""
+
+
 class Event(NamedTuple):
     """Something that happened in a flight, as the log has it on /events."""
 

@@ -34,6 +34,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "rpm": ("rad/s", _RPM),
     "rad/s^2": ("rad/s^2", 1.0),
     "deg/s^2": ("rad/s^2", _DEG),
+    "deg/s^3": ("rad/s^3", _DEG),
     "m": ("m", 1.0),
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),

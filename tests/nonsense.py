@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from orbit_samples import ephemeris
 from pydantic import BaseModel, RootModel
 
 from mjspace.scenario import sensors
@@ -44,7 +45,14 @@ FACTS: dict[str, Any] = {
     "thruster_positions": np.array(_RCS.positions),
     "thruster_directions": np.array(_RCS.unit_directions),
     "thruster_force": _RCS.of_each("thrust"),
+    "ephemeris": ephemeris("inclined"),
 }
+UNFLOWN = {
+    "targets:SpacecraftTarget": {
+        "target": {"kind": "relative_orbit:RelativeOrbit", "orbit_rate": 1e-3, "height": 9.0}
+    }
+}
+"""Gains of those that no scenario flies and that have others than numbers."""
 
 
 def kinds() -> Iterator[tuple[str, type]]:
@@ -65,6 +73,8 @@ def gains_of(name: str, kind: type) -> dict[str, Any]:
         for component in (scenario.law, scenario.reference):
             if component.kind == name:
                 return component.gains
+    if name in UNFLOWN:
+        return dict(UNFLOWN[name])
     required = [
         field
         for field in dataclasses.fields(kind)

@@ -13,6 +13,7 @@ from annotated_types import MaxLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from mjspace.contract import Ephemeris
 from mjspace.scenario.construct import table_of
 from mjspace.scenario.declared import DeclaredIn, tables_in, type_of
 from mjspace.scenario.docstrings import docstrings
@@ -76,13 +77,15 @@ def _laws() -> list[str]:
             flies = hasattr(kind, "batched") or hasattr(kind, "at")
             own = is_dataclass(kind) and kind.__module__ == module.__name__
             if own and flies and not inspect.isabstract(kind):
-                gains = [_gain(f) for f in fields(kind)]
+                gains = [_gain(f) for f in fields(kind) if f.type is not Ephemeris]
                 lines.append(f"| `{short}:{name}` | {', '.join(gains)} |")
     closing = """
 A gain without a default must be set, but for `inertia`, `wheel_axes`, `wheel_inertia`,
 `control_period` and `inner_period` (the integration step): left out, they are those of the
-vehicle and the scenario as flown. Every number of a gain is finite but where `inf`, no limit, is in
-its range. Arrays may come from a CSV file: `file = "turn.csv"`, with a header that names the gains
+vehicle and the scenario as flown. Those that point by the orbit are handed the ephemeris of the
+scenario's environment: see [pointing](references.md). Every number of a gain is finite but where
+`inf`, no limit, is in its range. Arrays may come from a CSV file: `file = "turn.csv"`, with a
+header that names the gains
 (`time,attitude0,attitude1,attitude2,attitude3`).
 
 A law in a file of your own may import modules beside it, at the top of the file, and read data

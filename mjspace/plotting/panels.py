@@ -9,6 +9,7 @@ from mjspace.contract import Array
 from mjspace.log import topics
 from mjspace.log.reader import Log
 from mjspace.plotting.decimate import Line, outlines
+from mjspace.scenario.boresight import ANGLES
 from mjspace.signals import find_signal
 from mjspace.units import Unit
 
@@ -159,11 +160,15 @@ def _of_connections(log: Log) -> list[Panel]:
 
 
 def _of_parts(log: Log) -> Iterator[Panel]:
-    """Yield the panel of how each moving part is bent or displaced."""
+    """Yield the panels of how each moving part is bent, and of where each boresight points."""
     for field in log.topics.get("/truth", {}):
         part, _, what = field.rpartition("_")
         if what in OF_PARTS:
             yield Panel(f"{OF_PARTS[what]} {part}", "/truth", field)
+        for angle, name in ANGLES.items():
+            if field.endswith(f"_{angle}"):
+                boresight = field.removesuffix(f"_{angle}")
+                yield Panel(f"Angle of {boresight} from {name}", "/truth", field)
 
 
 def chosen(log: Log, signals: Sequence[str]) -> list[Curves]:

@@ -12,6 +12,7 @@ from mjspace.log.rows import due
 from mjspace.log.scene import scene
 from mjspace.log.schema import Scene
 from mjspace.log.writer import LogWriter
+from mjspace.scenario.boresight import ANGLES
 from mjspace.scenario.loading import to_toml
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.recording import Block, one_vehicle, shapes
@@ -43,6 +44,8 @@ def units_of(assembly: Assembly, kinds: Mapping[str, type] = {}) -> dict[str, di
             units["/truth"].setdefault(quantity, unit)
     for report in reports(assembly.scenario.plant.moving_parts):
         units["/truth"][report.field] = Unit(report.unit)
+    for name in assembly.scenario.plant.boresights:
+        units["/truth"] |= {f"{name}_{angle}": Unit("rad") for angle in ANGLES}
     return units
 
 

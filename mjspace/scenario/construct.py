@@ -22,7 +22,8 @@ def construct(
     """Return the object of class ``kind`` with the component's gains, and the component as flown.
 
     A parameter that the table leaves out is taken from ``facts`` where they hold its name (the
-    vehicle's properties), else from its default; the component as flown has all written out.
+    vehicle's properties), else from its default; the component as flown has all written out, but
+    for facts that are objects, as the ephemeris is.
     ``file`` gives the rows of a table read from a CSV file with a header of parameter names. A
     table in a gain that has a ``kind`` is constructed in the same way, and so is one for a
     parameter that is annotated with a dataclass, or a list of it.
@@ -59,6 +60,8 @@ def _build(
     for name in gains:
         if name not in parameters:
             raise ValueError(f"{name}: {name_of_kind} has no such key{nearest(name, parameters)}")
+        if _is_object(facts.get(name)):
+            raise ValueError(f"{name}: it is that of the scenario's environment: leave it out")
     values = {name: facts[name] for name in parameters if name in facts} | dict(gains)
     missing = [
         name
@@ -80,8 +83,17 @@ def _build(
         raise
     except BaseException as error:
         raise ValueError(str(failure("it", error))) from error
-    flown = {name: plain(getattr(built, name, values.get(name))) for name in parameters}
+    flown = {
+        name: plain(getattr(built, name, values.get(name)))
+        for name in parameters
+        if not _is_object(facts.get(name))
+    }
     return built, flown | dict(written)
+
+
+def _is_object(fact: Any) -> bool:
+    """Tell whether a fact has methods, and no numbers that a scenario could hold."""
+    return fact is not None and np.asarray(fact).dtype == object
 
 
 def _tables_in(

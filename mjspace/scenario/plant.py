@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from mjspace.errors import shortened
 from mjspace.scenario import model_source
+from mjspace.scenario.boresight import Boresight
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.equipment import Equipment
 from mjspace.scenario.fields import (
@@ -143,6 +144,8 @@ class PlantTable(Table):
     """What is below it; nothing when left out."""
     ports: dict[Name, Port] = {}
     """Places on the vehicle at which other spacecraft are connected, by a name of one's own."""
+    boresights: dict[Name, Boresight] = {}
+    """Where its instruments look, by a name of one's own: ``[plant.boresights.camera]``."""
     spacecraft: dict[
         Name,
         Annotated[

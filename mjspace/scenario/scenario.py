@@ -221,6 +221,12 @@ class Scenario(Table):
         return self
 
     @model_validator(mode="after")
+    def _boresights_in_an_orbit(self) -> "Scenario":
+        if self.plant.boresights and self.environment.orbit is None:
+            raise ValueError("plant.boresights: needs an [environment.orbit]")
+        return self
+
+    @model_validator(mode="after")
     def _something_to_measure(self) -> "Scenario":
         check_sensors(self.sensors, self.environment)
         return self

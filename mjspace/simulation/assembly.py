@@ -13,6 +13,7 @@ from mjspace.actuators.actuator_set import ActuatorSet
 from mjspace.actuators.base import Context
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array, Law, ReferenceSource
+from mjspace.environment.ephemeris import KnownEphemeris
 from mjspace.environment.install import userdata, userdata_size
 from mjspace.environment.orbit import orbit_position
 from mjspace.errors import input_error_at
@@ -162,6 +163,7 @@ def assemble(
     )
     facts = facts_of(vehicle, scenario)
     law, flown["law"] = _component("law", scenario.law, facts, of_law, sources)
+    facts["ephemeris"] = KnownEphemeris(scenario.environment)  # of a reference alone
     reference, flown["reference"] = _component("reference", scenario.reference, facts, own, sources)
     _part("reference", reference.at, np.array([0.0, scenario.duration]))
     inner = _part("law", _has_inner_loop, law)

@@ -12,6 +12,7 @@ from mjspace.sensors.base import Motion
 from mjspace.sensors.magnetometer import Magnetometer
 from mjspace.sensors.velocimeter import Velocimeter
 from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.boresights import angles_at
 from mjspace.simulation.sunlight import Sunlight, sunlight_at
 
 _TRANSLATION = ("position", "velocity", "altitude")
@@ -49,6 +50,7 @@ class StateLayout:
             if quantity not in (*ALWAYS, "model") and not sensor.integrates
         }
         self.environment = assembly.scenario.environment
+        self.boresights = assembly.scenario.plant.boresights
 
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors report, as views of the state rows where that is possible.
@@ -86,10 +88,13 @@ class StateLayout:
         known |= (sunlight_at(motion, self.environment) or Sunlight(none, none))._asdict()
         return Truth(**{name: known[name] for name in Truth._fields})
 
-    def sunlight(self, physics: Array) -> dict[str, Array]:
-        """Return what is seen of the Sun at ``physics``; nothing where that is not known."""
-        found = sunlight_at(self.moving_bus(physics), self.environment)
-        return {} if found is None else found._asdict()
+    def sights(self, physics: Array) -> dict[str, Array]:
+        """Return what is seen of the Sun, as far as that is known, and where boresights look."""
+        motion = self.moving_bus(physics)
+        sun = sunlight_at(motion, self.environment)
+        direction = None if sun is None else sun.sun_direction
+        angles = angles_at(motion, direction, self.boresights, self.environment)
+        return angles if sun is None else sun._asdict() | angles
 
     def moving_bus(self, physics: Array) -> Motion:
         """Return the bus's motion, as views of the state rows."""

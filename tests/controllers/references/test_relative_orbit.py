@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mjspace.controllers.references.relative_orbit import RelativeOrbit
+from orbit_samples import ephemeris
 
 from mjspace import attitude as att
 from mjspace.contract import Array
@@ -47,3 +48,27 @@ def test_velocity_and_acceleration_are_the_derivatives(keys: dict[str, Any]) -> 
     )
     turned = att.multiply(att.conjugate(before.attitude), after.attitude)
     assert np.allclose(att.to_rotation_vector(turned) / (2 * h), now.rate)
+
+
+def test_left_out_the_rate_and_the_axes_are_those_of_the_scenarios_orbit() -> None:
+    known = ephemeris("inclined")
+    found = RelativeOrbit(center=np.array([10.0, 20.0, 30.0]), ephemeris=known).at(TIME)
+    at = known.origin(TIME)
+    up, normal = att.normalize(at.position), att.normalize(np.cross(at.position, at.velocity))
+    # 3e-12 measured, by the rounding of the mean anomaly.
+    place = 10.0 * up + 20.0 * np.cross(normal, up) + 30.0 * normal
+    np.testing.assert_allclose(found.position, place, atol=1e-10)
+    np.testing.assert_allclose(att.rotate(found.attitude, np.array([0.0, 0.0, 1.0])), normal)
+    rate = np.sqrt(3.986004418e14 / 7.2e6**3)
+    np.testing.assert_allclose(found.rate, np.tile([0.0, 0.0, rate], (25, 1)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("orbit", ["eccentric", "drifting"])
+def test_an_orbit_that_is_no_circle_has_no_such_rate(orbit: str) -> None:
+    with pytest.raises(ValueError, match=r"orbit_rate: missing, .* no constant one"):
+        RelativeOrbit(ephemeris=ephemeris(orbit)).at(TIME)
+
+
+def test_without_orbit_and_rate_it_is_refused() -> None:
+    with pytest.raises(ValueError, match="orbit_rate: missing"):
+        RelativeOrbit().at(TIME)

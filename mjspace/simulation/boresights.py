@@ -1,0 +1,49 @@
+"""The angles of boresights from what must not be looked at, or must be: Sun, planet and limb."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mjspace import attitude
+from mjspace.contract import Array
+from mjspace.environment.constants import RADIUS
+from mjspace.scenario.boresight import Boresight
+from mjspace.scenario.environment import Environment
+from mjspace.sensors.base import Motion
+
+
+def angles_at(
+    motion: Motion,
+    sun_direction: Array | None,
+    boresights: Mapping[str, Boresight],
+    environment: Environment,
+) -> dict[str, Array]:
+    """Return the angles [rad] of each boresight at ``motion``, (..., 1), by their fields of /truth.
+
+    ``sun_direction`` is in body axes, (..., 3); None where it is not known. The planet's disc is
+    that of a sphere of its (equatorial) radius.
+    """
+    if not boresights:
+        return {}
+    around = motion.surroundings
+    assert around.orbit_position is not None  # the scenario's validation has seen to it
+    place = around.orbit_position(motion.time) + motion.position
+    nadir = -attitude.rotate(attitude.conjugate(motion.attitude), place)
+    distance = np.sqrt(np.sum(place**2, axis=-1, keepdims=True))
+    disc = np.arcsin(np.minimum(RADIUS[environment.orbit.body] / distance, 1.0))
+    found: dict[str, Array] = {}
+    for name, boresight in boresights.items():
+        axis = attitude.normalize(np.array(boresight.axis))
+        off = _angle(nadir, axis)
+        found |= {f"{name}_nadir_angle": off, f"{name}_limb_angle": off - disc}
+        if sun_direction is not None:
+            found[f"{name}_sun_angle"] = _angle(sun_direction, axis)
+    return found
+
+
+def _angle(vector: Array, axis: Array) -> Array:
+    """Return the angle [rad] between ``vector`` (..., 3) and ``axis`` (3,), (..., 1)."""
+    normal = np.cross(vector, axis)
+    sine = np.sqrt(np.sum(normal**2, axis=-1, keepdims=True))
+    angle: Array = np.arctan2(sine, np.sum(vector * axis, axis=-1, keepdims=True))
+    return angle
