@@ -50,7 +50,7 @@ ROOMS = {
         "sensors signals tracing units vehicle"
     ),
     "runner": "contract errors interrupts log scenario signals simulation units vehicle",
-    "campaign": "contract errors interrupts log runner scenario simulation",
+    "campaign": "contract errors interrupts log runner scenario simulation units",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
