@@ -227,5 +227,6 @@ class FacetDrag(Term):
 
 def _lowest_altitude(orbit: Any) -> float:
     """Return the altitude of the periapsis [m]."""
-    lowest: float = orbit.semi_major_axis * (1.0 - orbit.eccentricity) - RADIUS[orbit.body]
-    return lowest
+    elements = orbit.elements()
+    semi_major_axis = math.hypot(*elements[4:7])
+    return float(semi_major_axis * (1.0 - elements[3])) - RADIUS[orbit.body]

@@ -57,7 +57,7 @@ def along(environment: Environment, control: float, duration: float) -> cubics.C
     [s]. Within 5e-5 of ``density_at``, whose single precision that is, at 250 to 820 km; measured.
     10 km above or below the frame's origin it is 2 % off.
     """
-    orbit, epoch = environment.orbit, environment.epoch
+    orbit, epoch = environment.orbit, environment.time_zero
     assert epoch is not None
 
     def values(time: Array) -> Array:

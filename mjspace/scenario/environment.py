@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import ValidationInfo, field_validator, model_validator
 
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.fields import Epoch, KindName, Table
@@ -57,9 +57,14 @@ class Environment(Table):
             yield from (term for term in several if hasattr(term, "kernels"))
 
     @property
+    def time_zero(self) -> datetime | None:
+        """Time zero, UTC: the epoch, or that of the orbit's two-line elements; None without."""
+        return self.epoch or (None if self.orbit is None else self.orbit.time_zero)
+
+    @property
     def has_sun(self) -> bool:
         """Whether it is known where the Sun is."""
-        return self.epoch is not None and self.orbit is not None and self.orbit.body == "earth"
+        return self.time_zero is not None and self.orbit is not None and self.orbit.body == "earth"
 
     @field_validator("epoch")
     @classmethod
@@ -67,6 +72,11 @@ class Environment(Table):
         if epoch is not None and not 1900 <= epoch.year < 2100:
             raise ValueError(f"{epoch:%Y-%m-%d}: the Sun's place is known from 1900 to 2100")
         return epoch
+
+    @field_validator("orbit")
+    @classmethod
+    def _begun(cls, orbit: Any, info: ValidationInfo) -> Any:
+        return None if orbit is None else orbit.begun_at(info.data.get("epoch"))
 
     @model_validator(mode="after")
     def _terms_can_act(self) -> Self:

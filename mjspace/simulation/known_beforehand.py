@@ -38,15 +38,16 @@ def known_of(scenario: Scenario) -> dict[str, Known]:
         from mjspace.environment import geomagnetism
 
         found["magnetic_field"] = geomagnetism.along(environment, control, duration)
-    if environment.epoch is not None and environment.has_sun:
+    if environment.time_zero is not None and environment.has_sun:
         from mjspace.environment import sun
 
-        found["sun_position"] = sun.along(environment.epoch, control, duration)
+        found["sun_position"] = sun.along(environment.time_zero, control, duration)
     if environment.facet_drag is not None and environment.facet_drag.nrlmsis is not None:
         from mjspace.environment import nrlmsis
 
         found["air_density"] = nrlmsis.along(environment, control, duration)
-    if environment.orbit is not None and environment.orbit.j2:
+    if environment.orbit is not None and environment.orbit.drifts_on:
+        environment.orbit.rows(np.array([0.0, duration]))  # a satellite may decay before
         found["orbit"] = environment.orbit
     return found
 
