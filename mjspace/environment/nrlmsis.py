@@ -13,8 +13,7 @@ import pymsis
 
 from mjspace.contract import Array
 from mjspace.environment import cubics
-from mjspace.environment.dipole import EARTH_ROTATION
-from mjspace.environment.geomagnetism import sidereal_angle
+from mjspace.environment.earth_rotation import EARTH_ROTATION, sidereal_angle
 from mjspace.environment.orbit import orbit_position
 from mjspace.scenario.environment import Environment
 

@@ -13,6 +13,7 @@ from mjspace.sensors.magnetometer import Magnetometer
 from mjspace.sensors.velocimeter import Velocimeter
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.sunlight import Sunlight, sunlight_at
+from mjspace.simulation.whereabouts import Whereabouts, whereabouts_at
 
 _TRANSLATION = ("position", "velocity", "altitude")
 """Quantities that the truth has wherever a sensor measures the bus's translation."""
@@ -84,12 +85,17 @@ class StateLayout:
         known["orbit_velocity"] = np.tile(speed, (vehicles, 1))
         none = np.empty((vehicles, 0))
         known |= (sunlight_at(motion, self.environment) or Sunlight(none, none))._asdict()
+        known |= (whereabouts_at(motion, self.environment) or Whereabouts(*[none] * 4))._asdict()
         return Truth(**{name: known[name] for name in Truth._fields})
 
-    def sunlight(self, physics: Array) -> dict[str, Array]:
-        """Return what is seen of the Sun at ``physics``; nothing where that is not known."""
-        found = sunlight_at(self.moving_bus(physics), self.environment)
-        return {} if found is None else found._asdict()
+    def in_orbit(self, physics: Array) -> dict[str, Array]:
+        """Return what is seen of the Sun and the Moon at ``physics``, and where above the Earth.
+
+        Nothing where that is not known.
+        """
+        motion = self.moving_bus(physics)
+        found = sunlight_at(motion, self.environment), whereabouts_at(motion, self.environment)
+        return {name: a for one in found if one is not None for name, a in one._asdict().items()}
 
     def moving_bus(self, physics: Array) -> Motion:
         """Return the bus's motion, as views of the state rows."""

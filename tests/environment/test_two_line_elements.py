@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from mjspace.contract import Array
 from mjspace.environment import kepler, two_line_elements
-from mjspace.environment.geomagnetism import sidereal_angle
+from mjspace.environment.earth_rotation import sidereal_angle
 from mjspace.environment.orbit import Orbit, orbit_position
 from mjspace.errors import InputError
 from mjspace.runner.replay import verify
