@@ -14,8 +14,9 @@ class Environment(Table):
     """What acts on the vehicle from outside; nothing when left out."""
 
     epoch: Epoch | None = None
-    """Time zero, UTC, of the magnetic field too. In an orbit around the Earth the Sun and the
-    Earth's shadow are known with it: ``truth.sun_direction`` and ``truth.sunlight``."""
+    """Time zero, UTC, of the magnetic field too. In an orbit around the Earth the Sun, the Moon,
+    the Earth's shadow and the place above it are known with it: ``truth.sun_direction``,
+    ``truth.moon_direction``, ``truth.sunlight``, ``truth.latitude``, ...."""
     shadow: Literal["cones", "cylinder"] = "cones"
     """Of the Earth: with a penumbra, or with an edge as of parallel light."""
     facets: list[
@@ -45,6 +46,12 @@ class Environment(Table):
     residual_dipole: Annotated[
         Any, DeclaredIn("mjspace.environment.residual_dipole:ResidualDipole")
     ] = None
+    hysteresis_rods: list[
+        Annotated[
+            Any, DeclaredIn("mjspace.environment.hysteresis_rod:HysteresisRod", optional=False)
+        ]
+    ] = []
+    """On the bus, in the magnetic field."""
     python: KindName | None = None
     """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
     inertial axes, torque [N m] in body axes), held over each integration step: first order only."""
