@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from mjspace.algebra import cross, dot
+from mjspace.attitude import normalize
 from mjspace.contract import Array, Gains, Measurement, Reference, Unit, gain
 
 from ..attitude.tracking_error import tracking_error
@@ -96,7 +97,7 @@ class MagneticPointing(Gains):
 class MomentumBias(Gains):
     """A wheel of momentum bias along the orbit's normal holds pitch, coils do the rest.
 
-    The wheel's torque is -(k q_e + c w_e) about its axis a; its momentum h makes roll and yaw
+    The wheel's torque is -(k q_e + c w_e) about an axis a; its momentum h makes roll and yaw
     stiff. The coils are asked for -c_x w_e across a, which damps the nutation and, since the orbit
     turns roll into yaw, the error of both, for -k_x q_e there, and for -k_h (h - h_0) a, which
     takes the wheel back to its bias. M. J. Sidi, Spacecraft Dynamics and Control, Cambridge 1997,
@@ -107,14 +108,16 @@ class MomentumBias(Gains):
     batched: ClassVar[bool] = True
 
     wheel_axes: Array = gain(shape=("wheel", 3), form="unit vector")
-    """Unit spin axis a, body axes: one row."""
+    """Unit spin axes, body axes, one row for each wheel; one along a is enough."""
     wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
-    """Axial inertia of the wheel."""
+    """Axial inertia of each wheel."""
+    pitch_axis: Array = gain(shape=(3,), form="direction")
+    """a: along which the wheels have their bias, body axes; normalized."""
     bias_momentum: float = gain("N m s")
-    """h_0: of the wheel along its axis. Along the orbit's normal, the sense of the orbit, it makes
+    """h_0: of the wheels along a. Along the orbit's normal, the sense of the orbit, it makes
     an attitude that turns with the orbit stable; the other way it has to be held."""
     pitch_gain: float = gain("N m", above=0.0)
-    """k: of half the angle about the wheel's axis."""
+    """k: of half the angle about a."""
     pitch_rate_gain: float = gain("N m s/rad", above=0.0)
     """c."""
     cross_gain: float = gain("N m", at_least=0.0)
@@ -124,11 +127,6 @@ class MomentumBias(Gains):
     unloading_gain: float = gain("1/s", at_least=0.0)
     """k_h."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if len(self.wheel_axes) != 1:
-            raise ValueError(f"wheel_axes: got {len(self.wheel_axes)} wheels, should be one")
-
     def reset(self, measurement: Measurement, reference: Reference) -> State:
         """Return the empty state."""
         return State()
@@ -137,7 +135,7 @@ class MomentumBias(Gains):
         self, state: State, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[State, Command, BiasSignals]:
         """Return the state, the wheel's torque and the coils' moment, and the signals."""
-        axis = self.wheel_axes[0]
+        axis = normalize(self.pitch_axis)
         error = tracking_error(measurement.attitude, measurement.rate, reference)
         turn, rate = error.quaternion[..., 1:], error.w_e
         turned, turning = dot(axis, turn), dot(axis, rate)
