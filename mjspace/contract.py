@@ -169,6 +169,14 @@ class Truth(NamedTuple):
     """Unit vector from the bus to the Sun, body axes, shape (3,)."""
     sunlight: Array
     """Part of the Sun's disc that the Earth's shadow leaves visible, 0 to 1, shape (1,)."""
+    moon_direction: Array
+    """Unit vector from the bus to the Moon, body axes, shape (3,)."""
+    latitude: Annotated[Array, Unit("rad")]
+    """Geodetic, of the bus above the Earth, on WGS 84 [rad], shape (1,)."""
+    longitude: Annotated[Array, Unit("rad")]
+    """Of the bus, east of Greenwich [rad], shape (1,)."""
+    height: Annotated[Array, Unit("m")]
+    """Of the bus above the ellipsoid of WGS 84 [m], shape (1,)."""
 
 
 class Reference(NamedTuple):

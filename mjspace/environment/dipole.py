@@ -5,8 +5,6 @@ from typing import Any
 
 from mjspace.environment.compiled import compiled
 
-EARTH_ROTATION = 7.292115e-5  # rad/s; Moritz 2000, Geodetic Reference System 1980
-
 
 @compiled
 def dipole(place: Any, north: Any, strength: float) -> tuple[float, float, float]:

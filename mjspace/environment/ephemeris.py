@@ -12,7 +12,7 @@ from numpy.polynomial import chebyshev
 
 from mjspace.contract import Array, Path
 from mjspace.environment.compiled import compiled
-from mjspace.environment.dipole import EARTH_ROTATION
+from mjspace.environment.earth_rotation import EARTH_ROTATION, sidereal_angle
 from mjspace.environment.orbit import orbit_position
 from mjspace.scenario.environment import Environment
 
@@ -96,15 +96,13 @@ class KnownEphemeris:
 
     @cached_property
     def _sidereal_angle(self) -> float:
-        from mjspace.environment.geomagnetism import sidereal_angle  # which reads IGRF
-
         return sidereal_angle(self._epoch)
 
     @property
     def _epoch(self) -> datetime:
-        epoch = self.environment.epoch
-        assert epoch is not None  # where it has a Sun
-        return epoch
+        zero = self.environment.time_zero
+        assert zero is not None  # where it has a Sun
+        return zero
 
 
 @compiled

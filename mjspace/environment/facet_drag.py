@@ -12,7 +12,7 @@ from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies, add_force_on_bus, in_bus_axes
 from mjspace.environment.compiled import compiled
 from mjspace.environment.constants import RADIUS
-from mjspace.environment.dipole import EARTH_ROTATION
+from mjspace.environment.earth_rotation import EARTH_ROTATION
 from mjspace.environment.facets import Facet
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import Finite, NonNegative, Positive, Si, Switch, Table
@@ -227,5 +227,6 @@ class FacetDrag(Term):
 
 def _lowest_altitude(orbit: Any) -> float:
     """Return the altitude of the periapsis [m]."""
-    lowest: float = orbit.semi_major_axis * (1.0 - orbit.eccentricity) - RADIUS[orbit.body]
-    return lowest
+    elements = orbit.elements()
+    semi_major_axis = math.hypot(*elements[4:7])
+    return float(semi_major_axis * (1.0 - elements[3])) - RADIUS[orbit.body]

@@ -5,7 +5,7 @@ The field is that at the frame's origin: a vehicle a kilometre off feels another
 
 import math
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 
 import numpy as np
 from pyIGRF14.calculate import igrf12syn as synthesis  # of the 14th generation, by its data
@@ -13,6 +13,7 @@ from pyIGRF14.loadCoeffs import get_coeffs
 
 from mjspace.contract import Array
 from mjspace.environment import cubics, dipole
+from mjspace.environment.earth_rotation import EARTH_ROTATION, sidereal_angle
 from mjspace.environment.magnetic_field import MagneticField
 from mjspace.environment.orbit import orbit_position
 from mjspace.scenario.environment import Environment
@@ -78,14 +79,14 @@ def field_at(table: MagneticField, epoch: datetime, place: Array, time: Array) -
         earth = dipole_of(epoch)
         tilt = earth.tilt if table.tilt is None else table.tilt
         longitude = earth.longitude + turned
-        rotation = dipole.EARTH_ROTATION
+        rotation = EARTH_ROTATION
         poles = [dipole.northern_pole(t, tilt, longitude, rotation) for t in time]
         rows = [dipole.dipole(*both, earth.strength) for both in zip(place, poles, strict=True)]
         return np.array(rows)
     radius = np.sqrt(np.sum(place**2, axis=-1))
     latitude = np.arcsin(place[:, 2] / radius)
     ascension = np.arctan2(place[:, 1], place[:, 0])
-    longitudes = np.degrees(ascension - turned - dipole.EARTH_ROTATION * time) % 360.0
+    longitudes = np.degrees(ascension - turned - EARTH_ROTATION * time) % 360.0
     year = _year(epoch)
     where = zip(1e-3 * radius, np.degrees(latitude), longitudes, strict=True)
     # itype 2: geocentric; km, degrees, nT
@@ -95,18 +96,6 @@ def field_at(table: MagneticField, epoch: datetime, place: Array, time: Array) -
     cosine, sine = np.cos(ascension), np.sin(ascension)
     x, y = level * cosine - east * sine, level * sine + east * cosine
     return 1e-9 * np.column_stack([x, y, along_axis])
-
-
-def sidereal_angle(epoch: datetime) -> float:
-    """Return Greenwich mean sidereal time [rad] at ``epoch``, UTC, which is within 1 s of UT1.
-
-    IERS Conventions (2010), Technical Note 36, (5.14) and (5.32) to the second order.
-    """
-    days = (epoch - datetime(2000, 1, 1, 12)) / timedelta(days=1)
-    turns = 0.7790572732640 + 0.00273781191135448 * days + days % 1.0
-    centuries = days / 36525.0
-    precession = 0.014506 + (4612.156534 + 1.3915817 * centuries) * centuries
-    return math.fmod(2.0 * math.pi * turns + math.radians(precession / 3600.0), 2.0 * math.pi)
 
 
 def _year(epoch: datetime) -> float:

@@ -66,7 +66,7 @@ class MagneticField(Term):
 
     def time_zero(self, environment: Environment) -> datetime:
         """Return time zero, UTC."""
-        return environment.epoch or self.epoch or DEFAULT_EPOCH
+        return environment.time_zero or self.epoch or DEFAULT_EPOCH
 
     def payload_size(self, environment: Environment) -> int:
         """Return the size of ``FIELD`` and ``MOMENT``."""
@@ -80,9 +80,9 @@ class MagneticField(Term):
         """Refuse all but an orbit around the Earth."""
         if environment.orbit is None or environment.orbit.body != "earth":
             raise ValueError('magnetic_field: needs an orbit with body = "earth"')
-        if self.epoch is not None and environment.epoch not in (None, self.epoch):
+        if self.epoch is not None and environment.time_zero not in (None, self.epoch):
             raise ValueError(
                 f"magnetic_field.epoch: {self.epoch} differs from environment.epoch, "
-                f"{environment.epoch}: leave it out"
+                f"{environment.time_zero}: leave it out"
             )
         self._known(self.time_zero(environment))

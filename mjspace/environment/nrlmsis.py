@@ -13,8 +13,7 @@ import pymsis
 
 from mjspace.contract import Array
 from mjspace.environment import cubics
-from mjspace.environment.dipole import EARTH_ROTATION
-from mjspace.environment.geomagnetism import sidereal_angle
+from mjspace.environment.earth_rotation import EARTH_ROTATION, sidereal_angle
 from mjspace.environment.orbit import orbit_position
 from mjspace.scenario.environment import Environment
 
@@ -57,7 +56,7 @@ def along(environment: Environment, control: float, duration: float) -> cubics.C
     [s]. Within 5e-5 of ``density_at``, whose single precision that is, at 250 to 820 km; measured.
     10 km above or below the frame's origin it is 2 % off.
     """
-    orbit, epoch = environment.orbit, environment.epoch
+    orbit, epoch = environment.orbit, environment.time_zero
     assert epoch is not None
 
     def values(time: Array) -> Array:

@@ -1,21 +1,45 @@
-"""A Kepler orbit whose free-fall frame the vehicle flies in: what is left of gravity there."""
+"""The orbit whose free-fall frame the vehicle flies in: what is left of gravity there.
+
+It is given by its elements, by a position and velocity, or by a satellite's two-line elements.
+"""
 
 import math
+from datetime import datetime
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from mjspace.contract import Array
-from mjspace.environment import kepler
+from mjspace.environment import kepler, two_line_elements
 from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies, add_wrench
 from mjspace.environment.compiled import compiled
 from mjspace.environment.constants import GM, J2, RADIUS
 from mjspace.environment.gravity import gradient_torque
+from mjspace.environment.osculating import elements_of
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Finite, Positive, Si, Switch, WithinTurn
+from mjspace.scenario.fields import (
+    Epoch,
+    Finite,
+    Meters3,
+    Positive,
+    Si,
+    Switch,
+    Velocity3,
+    WithinTurn,
+)
+
+_NOT_GIVEN: Any = None  # a number for all who read it of an orbit that has elements
+_ELEMENTS = (
+    "semi_major_axis",
+    "eccentricity",
+    "inclination",
+    "ascending_node",
+    "periapsis",
+    "true_anomaly",
+)
 
 
 @compiled
@@ -47,14 +71,17 @@ def tidal(orbit: Any, time: float, bodies: Bodies) -> None:
 
 
 class Orbit(Term):
-    """A Kepler orbit: its gravity gradient acts on every body, in the free-fall frame."""
+    """The orbit: its gravity gradient acts on every body, in the free-fall frame.
+
+    Elements, ``position`` and ``velocity``, or a ``tle``: one of the three.
+    """
 
     kernels: ClassVar = {1: tidal}
     reads: ClassVar = {"orbit": 0}
 
     body: Literal["earth", "moon"] = "earth"
     """What is orbited."""
-    semi_major_axis: Annotated[Positive, Si("m")]
+    semi_major_axis: Annotated[Positive, Si("m")] = _NOT_GIVEN
     """From the body's centre."""
     eccentricity: Annotated[Finite, Field(ge=0, lt=1)] = 0.0
     """0 is a circle."""
@@ -67,27 +94,117 @@ class Orbit(Term):
     true_anomaly: WithinTurn = 0.0
     """At time zero."""
 
+    position: Meters3 | None = None
+    """At time zero, from the body's centre, inertial axes."""
+    velocity: Velocity3 | None = None
+    """At time zero, inertial axes; below that of escape."""
+
+    tle: list[str] | None = None
+    """The two lines of a satellite of the Earth; SGP4 says where it is at each control instant, and
+    its orbit holds for a control period."""
+    epoch: Epoch | None = None
+    """Of an orbit from a ``tle``: time zero, UTC, where ``environment.epoch`` is left out; that of
+    the two lines without either."""
+
     j2: Switch = False
     """Whether the Earth's oblateness makes node, periapsis and mean anomaly drift, at their secular
     rates; the elements are then mean ones, and hold for a control period each."""
+
+    @field_validator("eccentricity", mode="before")
+    @classmethod
+    def _closed(cls, eccentricity: Any) -> Any:
+        if type(eccentricity) in (int, float) and eccentricity >= 1:
+            raise ValueError(
+                f"got {eccentricity:g}, should be less than 1: a parabola or hyperbola, which "
+                "escapes, is no orbit that there is here"
+            )
+        return eccentricity
+
+    @field_validator("tle")
+    @classmethod
+    def _two_lines(cls, tle: list[str] | None) -> list[str] | None:
+        if tle is not None:
+            two_line_elements.refuse_malformed(tle)
+        return tle
+
+    @model_validator(mode="after")
+    def _given_once(self) -> Self:
+        changed = [n for n in _ELEMENTS if getattr(self, n) != type(self).model_fields[n].default]
+        by_state = [n for n in ("position", "velocity") if getattr(self, n) is not None]
+        ways = [*changed[:1], *by_state[:1], *(["tle"] if self.tle else [])]
+        if len(ways) > 1:
+            raise ValueError(
+                f"got {' and '.join(ways)}: an orbit has elements, a position and velocity, or a "
+                "tle: give one of the three"
+            )
+        if not by_state and not self.tle and self.semi_major_axis is None:
+            raise ValueError(
+                "semi_major_axis: missing; or give a position and velocity, or a tle, instead"
+            )
+        if len(by_state) == 1:
+            raise ValueError(
+                f"{'velocity' if by_state == ['position'] else 'position'}: missing beside "
+                f"{by_state[0]}"
+            )
+        if self.tle and self.body != "earth":
+            raise ValueError('tle: is of a satellite of body = "earth"')
+        if self.epoch is not None and not self.tle:
+            raise ValueError("epoch: is of an orbit from a tle: set environment.epoch")
+        return self
 
     @model_validator(mode="after")
     def _of_the_earth(self) -> Self:
         if self.j2 and self.body not in J2:
             raise ValueError(f'j2: the rates are those of body = "earth", not of the {self.body}')
+        if self.j2 and self.semi_major_axis is None:
+            which = "SGP4 has them already" if self.tle else "a position and velocity have none"
+            raise ValueError(f"j2: the rates are of mean elements: {which}: leave it out")
         return self
 
     @model_validator(mode="after")
     def _above_the_planet(self) -> Self:
-        lowest, radius = self.semi_major_axis * (1.0 - self.eccentricity), RADIUS[self.body]
+        try:
+            elements = self.elements()
+        except ValueError as error:
+            raise ValueError(f"{'tle' if self.tle else 'velocity'}: {error}") from None
+        semi_major_axis = float(np.sqrt(np.sum(elements[4:7] ** 2)))
+        lowest, radius = semi_major_axis * (1.0 - float(elements[3])), RADIUS[self.body]
         if lowest <= radius:
-            meant = f": did you mean '{self.semi_major_axis:.10g} km'?"
+            key = next(k for k in ("semi_major_axis", "position", "tle") if getattr(self, k))
+            size = self.semi_major_axis or float(np.sqrt(np.sum(np.square(self.position or 0.0))))
+            shown = f"'{size:.10g} km'" if key == "semi_major_axis" else "km"
+            meant = f": did you mean {shown}?" if radius < 1e3 * size < 100.0 * radius else ""
+            got = f"got {size:.10g} m, with which " if size else ""
             raise ValueError(
-                f"semi_major_axis: got {self.semi_major_axis:.10g} m, with which the periapsis, "
+                f"{key}: {got}the periapsis, "
                 f"{lowest:.6g} m from the centre, is inside the {self.body}, whose radius is "
-                f"{radius:.6g} m{meant if radius < 1e3 * lowest < 100.0 * radius else ''}"
+                f"{radius:.6g} m{meant}"
             )
         return self
+
+    @property
+    def drifts_on(self) -> bool:
+        """Whether another Kepler orbit holds in each control period."""
+        return self.j2 or self.tle is not None
+
+    @property
+    def time_zero(self) -> datetime | None:
+        """Time zero, UTC, where the orbit says it."""
+        return self.epoch or (two_line_elements.epoch_of(self.tle) if self.tle else None)
+
+    def begun_at(self, epoch: datetime | None) -> Self:
+        """Return the orbit with time zero at ``epoch``, UTC, if it depends on that.
+
+        Raises:
+            ValueError: the orbit has another epoch of its own.
+        """
+        if not self.tle or epoch is None:
+            return self
+        if self.epoch not in (None, epoch):
+            raise ValueError(
+                f"epoch: {self.epoch} differs from environment.epoch, {epoch}: leave it out"
+            )
+        return self.model_copy(update={"epoch": epoch})
 
     def payload_size(self, environment: Environment) -> int:
         """Return the size of ``elements``."""
@@ -103,8 +220,10 @@ class Orbit(Term):
         GM [m^3/s^2], mean motion [rad/s], mean anomaly at time zero [rad], eccentricity, then the
         two semi-axes as vectors [m], towards the periapsis and along the motion there.
         """
-        a, e = self.semi_major_axis, self.eccentricity
         gm = GM[self.body]
+        if self.semi_major_axis is None:
+            return self._osculating(np.zeros(1))[0]
+        a, e = self.semi_major_axis, self.eccentricity
         half = math.atan2(
             math.sqrt(1.0 - e) * math.sin(0.5 * self.true_anomaly),
             math.sqrt(1.0 + e) * math.cos(0.5 * self.true_anomaly),
@@ -125,7 +244,7 @@ class Orbit(Term):
         [rad/s]; to first order in J2 (Vallado 2013, Fundamentals of Astrodynamics and Applications,
         4th edition, section 9.6.1). Zero without ``j2``.
         """
-        if not self.j2:
+        if not self.j2 or self.semi_major_axis is None:
             return 0.0, 0.0, 0.0
         a, shrink = self.semi_major_axis, 1.0 - self.eccentricity**2
         rate = math.sqrt(GM[self.body] / a**3)
@@ -138,7 +257,13 @@ class Orbit(Term):
         )
 
     def rows(self, time: Array) -> Array:
-        """Return the elements that hold at each ``time`` [s], (n,), as (n, 10)."""
+        """Return the elements that hold at each ``time`` [s], (n,), as (n, 10).
+
+        Raises:
+            ValueError: SGP4 does not know the satellite then.
+        """
+        if self.tle:
+            return self._osculating(time)
         rows = np.tile(self.elements(), (len(time), 1))
         if not self.j2:
             return rows
@@ -155,6 +280,16 @@ class Orbit(Term):
             rows[:, x + 1] = sine * rows[:, x] + cosine * rows[:, x + 1]
             rows[:, x] = turned
         return rows
+
+    def _osculating(self, time: Array) -> Array:
+        """Return the elements at each ``time`` [s], (n,), from positions and velocities."""
+        if self.tle:
+            epoch = self.time_zero
+            assert epoch is not None
+            place, velocity = two_line_elements.motion(self.tle, epoch, time)
+        else:
+            place, velocity = (np.array([v], dtype=float) for v in (self.position, self.velocity))
+        return elements_of(place, velocity, time, GM[self.body])
 
 
 def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:

@@ -19,6 +19,11 @@ _J2000 = 2451545.0  # Julian date
 _TT_BEHIND_UTC = 69.184 / 86400.0  # days since 2017; the Sun moves by 8e-4 deg in that time
 
 
+def dynamical_time(epoch: datetime) -> tuple[float, float]:
+    """Return ``epoch``, UTC, as a Julian date of terrestrial time in two parts [days]."""
+    return _J2000, (epoch - datetime(2000, 1, 1, 12)) / timedelta(days=1) + _TT_BEHIND_UTC
+
+
 def position(epoch: datetime, time: Array) -> Array:
     """Return the Sun's position from the Earth's centre [m], inertial axes, (n, 3).
 
@@ -26,9 +31,9 @@ def position(epoch: datetime, time: Array) -> Array:
     aberration. ERFA's ``epv00``: X. Moisson and P. Bretagnon's VSOP2000 as fitted to DE405, for the
     years 1900 to 2100; precession is that of IAU 2006 (``pmat06``).
     """
-    begin = (epoch - datetime(2000, 1, 1, 12)) / timedelta(days=1) + _TT_BEHIND_UTC
-    heliocentric, _ = erfa.epv00(_J2000, begin + time / 86400.0)
-    axes = erfa.pmat06(_J2000, begin)
+    day, begin = dynamical_time(epoch)
+    heliocentric, _ = erfa.epv00(day, begin + time / 86400.0)
+    axes = erfa.pmat06(day, begin)
     place: Array = -ASTRONOMICAL_UNIT * np.asarray(heliocentric["p"]) @ axes.T
     return place
 

@@ -110,6 +110,23 @@ def transforms(bodies: Sequence[str]) -> Layout:
     return _layout(template, formats, offsets)
 
 
+def location(frame: str) -> Layout:
+    """Return the layout of a ``foxglove.LocationFix`` of the frame of that name.
+
+    Its fields are ``seconds`` and ``nanoseconds`` (``varint5``) and ``place``: latitude [deg],
+    longitude [deg] and altitude [m], whose numbers are under ``value``.
+    """
+    coordinate = np.dtype([("tag", "u1"), ("value", "<f8")])
+    head = _tag(6, _BYTES) + _varint(len(_STAMP))
+    middle = head + _STAMP + _text(7, frame)
+    formats = {
+        "seconds": ("u1", (5,)),
+        "nanoseconds": ("u1", (5,)),
+        "place": (coordinate, (3,)),
+    }
+    return _layout(middle + _vector(3), formats, [len(head) + 1, len(head) + 7, len(middle)])
+
+
 def varint5(values: NDArray[np.uint64]) -> NDArray[np.uint8]:
     """Return numbers below 2^35, shape (n,), as protobuf varints padded to five bytes, (n, 5)."""
     digits = (values[:, None] >> np.arange(5, dtype=np.uint64) * np.uint64(7)) & np.uint64(0x7F)

@@ -5,6 +5,7 @@ from math import prod
 from typing import Any, NamedTuple
 
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.descriptor import FileDescriptor
@@ -31,7 +32,12 @@ PERIODIC = {
 }
 """Topics with a row at every control period, or every n-th, with their messages' names."""
 
-_FOXGLOVE: dict[str, Any] = {"/tf": FrameTransforms, "/scene": SceneUpdate, "/events": Log}
+_FOXGLOVE: dict[str, Any] = {
+    "/tf": FrameTransforms,
+    "/scene": SceneUpdate,
+    "/events": Log,
+    "/location": LocationFix,
+}
 
 
 Shapes = dict[str, tuple[int, ...]]
@@ -53,8 +59,12 @@ def channels(
     topics: Mapping[str, Fields],
     units: Mapping[str, Mapping[str, Unit]],
     every: Mapping[str, int] = {},
+    *,
+    located: bool = False,
 ) -> tuple[list[Schema], list[Channel]]:
     """Return the records that declare ``topics``, then /tf, /scene, /events and /robot_description.
+
+    With ``located`` /location is declared before the last.
 
     A periodic channel's metadata has, of each field, ``shape.<field>`` ("9,9"; empty for a number)
     and, where ``units`` has one, ``unit.<field>``; and ``every``, the number of control periods
@@ -84,6 +94,8 @@ def channels(
             metadata["every"] = str(every[topic])
         declare(topic, PERIODIC[topic], "protobuf", descriptor(PERIODIC[topic], fields), metadata)
     for topic, message in _FOXGLOVE.items():
+        if topic == "/location" and not located:
+            continue
         described = message.DESCRIPTOR
         declare(topic, described.full_name, "protobuf", _descriptor_of(described.file), {})
     declare("/robot_description", "std_msgs/msg/String", "ros2msg", b"string data", {})

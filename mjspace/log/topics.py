@@ -39,6 +39,10 @@ class DerivedTruth:
     wheel_momentum_margin: Annotated[Array, Unit("N m s")]
     """What each reaction wheel can still take up of momentum before its speed limit, shape (n,);
     where ``plant.wheels.momentum_margin`` is set."""
+    rod_field: Annotated[Array, Unit("A/m")]
+    """Of the Earth along each hysteresis rod, shape (n,)."""
+    rod_flux_density: Annotated[Array, Unit("T")]
+    """Of each hysteresis rod along itself, shape (n,)."""
     foot_force: Annotated[Array, Unit("N")]
     """Magnitude of the ground's force on each foot, shape (f,)."""
     hull_force: Annotated[Array, Unit("N")]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mjspace.contract import Array
 from mjspace.log.chunk import Nanoseconds, Part, block, message
 from mjspace.log.digest import RECORD, RowDigests
-from mjspace.log.encoding import Fields, side_by_side, transforms, varint5
+from mjspace.log.encoding import Fields, location, side_by_side, transforms, varint5
 from mjspace.log.file import LogFile
 from mjspace.log.rows import TopicGroup, due, stamp
 from mjspace.log.schema import Scene, channels
@@ -36,6 +36,7 @@ class LogWriter:
         units: Mapping[str, Mapping[str, Unit]],
         every: Mapping[str, int] = {},
         first: int = 0,
+        located: str = "",
     ) -> None:
         """Create the file.
 
@@ -43,12 +44,13 @@ class LogWriter:
         of some of them by topic and field; ``attachments`` are (media type, content) by name.
         ``every`` says which control periods of a topic are logged, where not all: those whose
         number it divides, the flight's first, which is number ``first``, and its last.
+        ``located`` is the frame whose place on the Earth is logged; "" where that is not known.
 
         Raises:
             OSError: the file cannot be written.
             ValueError: a topic or a field that the log cannot hold.
         """
-        schemas, declared = channels(topics, units, every)
+        schemas, declared = channels(topics, units, every, located=bool(located))
         self._channels = {channel.topic: channel.id for channel in declared}
         rates = {topic: every.get(topic, 1) for topic in topics}
         self._groups = [
@@ -56,6 +58,11 @@ class LogWriter:
             for rate in sorted(set(rates.values()))
         ]
         self._frames = side_by_side({"/tf": transforms(scene.bodies).record(self._channels["/tf"])})
+        self._places = (
+            side_by_side({"/location": location(located).record(self._channels["/location"])})
+            if located
+            else None
+        )
         self._scene = scene
         self._first = first
         self._count = 0
@@ -112,6 +119,23 @@ class LogWriter:
             columns[f"position_{i}"]["value"] = positions[:, i]
             columns[f"quaternion_{i}"]["value"] = quaternions[:, i, [1, 2, 3, 0]]
         self._pending.append(block(records, {"/tf": self._channels["/tf"]}, stamps))
+
+    def write_locations(self, time: Array, place: Array) -> None:
+        """Log where the vehicle is above the Earth on /location, with the next chunk.
+
+        ``time`` [s] of shape (m,); ``place`` (m, 3): latitude [deg], longitude [deg], height [m].
+        """
+        if self._places is None or not len(time):
+            return
+        stamps = nanoseconds(time)
+        records = self._places.rows(len(time))
+        stamp(records["/location"], stamps, np.zeros(len(time), int))
+        columns = records["/location"]["message"]
+        columns["seconds"], columns["nanoseconds"] = (
+            varint5(part) for part in np.divmod(stamps, np.uint64(1_000_000_000))
+        )
+        columns["place"]["value"] = place
+        self._pending.append(block(records, {"/location": self._channels["/location"]}, stamps))
 
     def event(self, time: float, level: str, text: str) -> None:
         """Log ``text`` on /events with the next chunk; ``level`` is one of ``foxglove.Log``'s."""

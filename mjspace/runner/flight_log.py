@@ -7,6 +7,7 @@ from typing import Any, Self
 import mujoco
 import numpy as np
 
+from mjspace.contract import Array
 from mjspace.log import foxglove_layout, provenance, topics
 from mjspace.log.rows import due
 from mjspace.log.scene import scene
@@ -62,8 +63,8 @@ class FlightLog:
         self._data = mujoco.MjData(self._model)
         self._every = scenario.log.every(scenario.rates.control)
         self._first = first.period
-        self._last_frame: tuple[np.ndarray, np.ndarray] | None = None
-        """Time (1,) [s] and state (1, nstate) of the last period, unless its frames are logged."""
+        self._last: dict[str, tuple[Array, Array]] = {}
+        """Time (1,) [s] and values of the last period, of each viewers' topic that lacks it."""
         bus = self._model.body(bus_id(self._model)).name
         compiled, drawn = described(self._model)
         topics = shapes(first)
@@ -85,6 +86,7 @@ class FlightLog:
             units_of(assembly, first.kinds),
             self._every,
             self._first,
+            located=bus if "latitude" in first.rows["/truth"] else "",
         )
 
     def write(self, block: Block) -> None:
@@ -95,12 +97,13 @@ class FlightLog:
         """
         rows = one_vehicle(block)
         # What goes into a chunk beside the periods must be handed over before them.
-        physics = rows["/state"]["physics"]
         sequence = block.period - self._first + np.arange(len(block.time))
-        chosen = due(self._first, sequence, self._every["/tf"])
-        self._write_frames(block.time[chosen], physics[chosen])
-        logged = sequence[-1] in sequence[chosen]
-        self._last_frame = None if logged else (block.time[-1:], physics[-1:].copy())
+        self._last = {}
+        for topic, values in _shown(rows).items():
+            chosen = due(self._first, sequence, self._every[topic])
+            self._show(topic, block.time[chosen], values[chosen])
+            if sequence[-1] not in sequence[chosen]:
+                self._last[topic] = block.time[-1:], values[-1:].copy()
         for time, _, level, text in block.events:
             self._log.event(time, level, text)
         self._log.write(block.time, rows)
@@ -114,12 +117,19 @@ class FlightLog:
 
     def __exit__(self, *_: Any) -> None:
         try:
-            if self._last_frame is not None:
-                self._write_frames(*self._last_frame)
+            for topic, (time, values) in self._last.items():
+                self._show(topic, time, values)
         finally:
             self._log.close()
 
-    def _write_frames(self, time: np.ndarray, states: np.ndarray) -> None:
+    def _show(self, topic: str, time: Array, values: Array) -> None:
+        """Log what ``_shown`` returned of a topic, at ``time`` (n,) [s]."""
+        if topic == "/tf":
+            self._write_frames(time, values)
+        else:
+            self._log.write_locations(time, values)
+
+    def _write_frames(self, time: Array, states: Array) -> None:
         """Log the bodies' frames at ``time`` (n,) [s], of MuJoCo's ``states`` (n, nstate)."""
         positions = np.empty((len(time), self._model.nbody - 1, 3))
         quaternions = np.empty((len(time), self._model.nbody - 1, 4))
@@ -128,6 +138,16 @@ class FlightLog:
             mujoco.mj_kinematics(self._model, self._data)
             positions[i], quaternions[i] = self._data.xpos[1:], self._data.xquat[1:]
         self._log.write_transforms(time, positions, quaternions)
+
+
+def _shown(rows: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
+    """Return what goes on each topic for viewers, (n, k): states, and places on the Earth."""
+    truth = rows["/truth"]
+    found = {"/tf": rows["/state"]["physics"]}
+    if "latitude" in truth:
+        angles = np.degrees(np.hstack([truth["latitude"], truth["longitude"]]))
+        found["/location"] = np.hstack([angles, truth["height"]])
+    return found
 
 
 def described(model: Any) -> tuple[bytes, Scene]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import ValidationInfo, field_validator, model_validator
 
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.fields import Epoch, KindName, Table
@@ -14,8 +14,9 @@ class Environment(Table):
     """What acts on the vehicle from outside; nothing when left out."""
 
     epoch: Epoch | None = None
-    """Time zero, UTC, of the magnetic field too. In an orbit around the Earth the Sun and the
-    Earth's shadow are known with it: ``truth.sun_direction`` and ``truth.sunlight``."""
+    """Time zero, UTC, of the magnetic field too. In an orbit around the Earth the Sun, the Moon,
+    the Earth's shadow and the place above it are known with it: ``truth.sun_direction``,
+    ``truth.moon_direction``, ``truth.sunlight``, ``truth.latitude``, ...."""
     shadow: Literal["cones", "cylinder"] = "cones"
     """Of the Earth: with a penumbra, or with an edge as of parallel light."""
     facets: list[
@@ -45,6 +46,12 @@ class Environment(Table):
     residual_dipole: Annotated[
         Any, DeclaredIn("mjspace.environment.residual_dipole:ResidualDipole")
     ] = None
+    hysteresis_rods: list[
+        Annotated[
+            Any, DeclaredIn("mjspace.environment.hysteresis_rod:HysteresisRod", optional=False)
+        ]
+    ] = []
+    """On the bus, in the magnetic field."""
     python: KindName | None = None
     """A function of one's own, ``"file.py:name"``: name(time, truth) -> (force [N] on the bus in
     inertial axes, torque [N m] in body axes), held over each integration step: first order only."""
@@ -57,9 +64,14 @@ class Environment(Table):
             yield from (term for term in several if hasattr(term, "kernels"))
 
     @property
+    def time_zero(self) -> datetime | None:
+        """Time zero, UTC: the epoch, or that of the orbit's two-line elements; None without."""
+        return self.epoch or (None if self.orbit is None else self.orbit.time_zero)
+
+    @property
     def has_sun(self) -> bool:
         """Whether it is known where the Sun is."""
-        return self.epoch is not None and self.orbit is not None and self.orbit.body == "earth"
+        return self.time_zero is not None and self.orbit is not None and self.orbit.body == "earth"
 
     @field_validator("epoch")
     @classmethod
@@ -67,6 +79,11 @@ class Environment(Table):
         if epoch is not None and not 1900 <= epoch.year < 2100:
             raise ValueError(f"{epoch:%Y-%m-%d}: the Sun's place is known from 1900 to 2100")
         return epoch
+
+    @field_validator("orbit")
+    @classmethod
+    def _begun(cls, orbit: Any, info: ValidationInfo) -> Any:
+        return None if orbit is None else orbit.begun_at(info.data.get("epoch"))
 
     @model_validator(mode="after")
     def _terms_can_act(self) -> Self:

@@ -5,7 +5,8 @@ from typing import Annotated
 from mjspace.scenario.fields import Interval, Positive, Table
 from mjspace.units import whole_number
 
-_FRAME_PERIOD = 0.01  # s: /tf has every body at most 100 times a second
+_AT_LEAST = {"tf": 0.01, "location": 1.0}
+"""s between rows for viewers: every body's frame, and the place on the Earth."""
 
 LogPeriod = Annotated[Positive, Interval("s")]
 
@@ -29,6 +30,9 @@ class LogRates(Table):
     disturbance: LogPeriod | None = None
     tf: LogPeriod | None = None
     """Frames of the bodies, for viewers; when left out as ``default``, but at most 100 Hz."""
+    location: LogPeriod | None = None
+    """Where above the Earth the vehicle is, for viewers; when left out as ``default``, but at most
+    1 Hz. Logged where an orbit around the Earth and its epoch are known."""
 
     def every(self, control: float) -> dict[str, int]:
         """Return how many control periods of ``control`` [s] there are to a row, by topic.
@@ -42,6 +46,6 @@ class LogRates(Table):
             if period is not None:
                 found[key] = whole_number(period, control, f"log.{key}", "rates.control")
         default = found.pop("default", 1)
-        frames = max(default, round(_FRAME_PERIOD / control))
         topics = [key for key in type(self).model_fields if key != "default"]
-        return {f"/{key}": found.get(key, frames if key == "tf" else default) for key in topics}
+        least = {key: round(_AT_LEAST.get(key, 0.0) / control) for key in topics}
+        return {f"/{key}": found.get(key, max(default, least[key])) for key in topics}

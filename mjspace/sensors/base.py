@@ -43,6 +43,8 @@ class Surroundings:
     """Of the Earth, inertial axes [T], (..., 3), at each time [s], (...)."""
     sun_position: Callable[[Array], Array] | None = None
     """Of the Sun from the Earth's centre, inertial axes [m], (..., 3), at each time [s], (...)."""
+    moon_position: Callable[[Array], Array] | None = None
+    """Likewise of the Moon."""
     orbit_position: Callable[[Array], Array] | None = None
     """Of the frame's origin from the planet's centre, inertial axes [m], (..., 3), at each time."""
 

@@ -1,4 +1,4 @@
-"""The angles of boresights from what must not be looked at, or must be: Sun, planet and limb."""
+"""The angles of boresights from what must not be looked at, or must be: Sun, Moon, planet, limb."""
 
 from collections.abc import Mapping
 
@@ -14,14 +14,14 @@ from mjspace.sensors.base import Motion
 
 def angles_at(
     motion: Motion,
-    sun_direction: Array | None,
+    seen: Mapping[str, Array],
     boresights: Mapping[str, Boresight],
     environment: Environment,
 ) -> dict[str, Array]:
     """Return the angles [rad] of each boresight at ``motion``, (..., 1), by their fields of /truth.
 
-    ``sun_direction`` is in body axes, (..., 3); None where it is not known. The planet's disc is
-    that of a sphere of its (equatorial) radius.
+    ``seen`` has the directions of Sun and Moon in body axes, (..., 3), by their fields of /truth,
+    as far as they are known. The planet's disc is that of a sphere of its equatorial radius.
     """
     if not boresights:
         return {}
@@ -36,8 +36,9 @@ def angles_at(
         axis = attitude.normalize(np.array(boresight.axis))
         off = _angle(nadir, axis)
         found |= {f"{name}_nadir_angle": off, f"{name}_limb_angle": off - disc}
-        if sun_direction is not None:
-            found[f"{name}_sun_angle"] = _angle(sun_direction, axis)
+        for body in ("sun", "moon"):
+            if f"{body}_direction" in seen:
+                found[f"{name}_{body}_angle"] = _angle(seen[f"{body}_direction"], axis)
     return found
 
 

@@ -6,6 +6,7 @@ from mjspace.simulation.actuator_faults import ActuatorFaults
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.burning_mass import BurningMass
 from mjspace.simulation.connections import Connections
+from mjspace.simulation.hysteresis import Hysteresis
 from mjspace.simulation.known_beforehand import KnownBeforehand
 from mjspace.simulation.model_sensors import ModelSensors
 from mjspace.simulation.state_layout import StateLayout
@@ -29,6 +30,7 @@ def effects_of(
         Connections.of(assembly),
         ActuatorFaults.of(assembly, members),
         KnownBeforehand.of(assembly.known, scenario),
+        Hysteresis.of(assembly, layout),
         UserDisturbance.of(assembly, layout),
         LoggedParts.of(model, reports(scenario.plant.moving_parts)),
         deployments.of(model, assembly.qpos, scenario.plant.parts, scenario.rates.physics),

@@ -1,7 +1,7 @@
 """What is known of the environment as a function of time, as a step effect: what holds now.
 
-The magnetic field, the Sun's position and the air's density, each a cubic of time, and the elements
-of an orbit that drifts.
+The magnetic field, where the Sun and the Moon are, and the air's density, each a cubic of time, and
+the elements of an orbit that drifts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,6 +17,9 @@ from mjspace.environment.install import places_read
 from mjspace.scenario.scenario import Scenario
 from mjspace.sensors.base import Surroundings
 from mjspace.vehicle.step_effect import Instant, State, StepEffect, Write
+
+_SEEN = ("magnetic_field", "sun_position", "moon_position")
+"""What of it sensors and logs may read."""
 
 
 class Known(Protocol):
@@ -38,22 +41,24 @@ def known_of(scenario: Scenario) -> dict[str, Known]:
         from mjspace.environment import geomagnetism
 
         found["magnetic_field"] = geomagnetism.along(environment, control, duration)
-    if environment.epoch is not None and environment.has_sun:
-        from mjspace.environment import sun
+    if environment.time_zero is not None and environment.has_sun:
+        from mjspace.environment import moon, sun
 
-        found["sun_position"] = sun.along(environment.epoch, control, duration)
+        found["sun_position"] = sun.along(environment.time_zero, control, duration)
+        found["moon_position"] = moon.along(environment.time_zero, control, duration)
     if environment.facet_drag is not None and environment.facet_drag.nrlmsis is not None:
         from mjspace.environment import nrlmsis
 
         found["air_density"] = nrlmsis.along(environment, control, duration)
-    if environment.orbit is not None and environment.orbit.j2:
+    if environment.orbit is not None and environment.orbit.drifts_on:
+        environment.orbit.rows(np.array([0.0, duration]))  # a satellite may decay before
         found["orbit"] = environment.orbit
     return found
 
 
 def seen_of(known: Mapping[str, Known]) -> dict[str, Any]:
     """Return the cubics that are fields of ``Surroundings``."""
-    return {name: known[name] for name in ("magnetic_field", "sun_position") if name in known}
+    return {name: known[name] for name in _SEEN if name in known}
 
 
 def changing(known: Mapping[str, Known], scenario: Scenario) -> list[slice]:

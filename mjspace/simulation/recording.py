@@ -213,7 +213,7 @@ def block_of(
         "/truth": {
             **_without_empty(truth._asdict()),
             **of_effects,
-            **layout.sights(physics),
+            **layout.in_orbit(physics),
             "position": physics[..., layout.position],
             "velocity": physics[..., layout.velocity],
             **_position_errors(physics[..., layout.position], truth.attitude, desired),

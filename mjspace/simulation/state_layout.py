@@ -14,6 +14,7 @@ from mjspace.sensors.velocimeter import Velocimeter
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.boresights import angles_at
 from mjspace.simulation.sunlight import Sunlight, sunlight_at
+from mjspace.simulation.whereabouts import Whereabouts, whereabouts_at
 
 _TRANSLATION = ("position", "velocity", "altitude")
 """Quantities that the truth has wherever a sensor measures the bus's translation."""
@@ -86,15 +87,19 @@ class StateLayout:
         known["orbit_velocity"] = np.tile(speed, (vehicles, 1))
         none = np.empty((vehicles, 0))
         known |= (sunlight_at(motion, self.environment) or Sunlight(none, none))._asdict()
+        known |= (whereabouts_at(motion, self.environment) or Whereabouts(*[none] * 4))._asdict()
         return Truth(**{name: known[name] for name in Truth._fields})
 
-    def sights(self, physics: Array) -> dict[str, Array]:
-        """Return what is seen of the Sun, as far as that is known, and where boresights look."""
+    def in_orbit(self, physics: Array) -> dict[str, Array]:
+        """Return what is seen of Sun and Moon, where above the Earth, and where boresights look.
+
+        Nothing where that is not known.
+        """
         motion = self.moving_bus(physics)
         sun = sunlight_at(motion, self.environment)
-        direction = None if sun is None else sun.sun_direction
-        angles = angles_at(motion, direction, self.boresights, self.environment)
-        return angles if sun is None else sun._asdict() | angles
+        where = whereabouts_at(motion, self.environment)
+        found = {n: a for one in (sun, where) if one is not None for n, a in one._asdict().items()}
+        return found | angles_at(motion, found, self.boresights, self.environment)
 
     def moving_bus(self, physics: Array) -> Motion:
         """Return the bus's motion, as views of the state rows."""

@@ -11,8 +11,8 @@ from orbit_samples import ORBITS, ephemeris
 from mjspace import attitude
 from mjspace.environment import kepler, sun
 from mjspace.environment.constants import GM
+from mjspace.environment.earth_rotation import sidereal_angle
 from mjspace.environment.ephemeris import KnownEphemeris
-from mjspace.environment.geomagnetism import sidereal_angle
 from mjspace.environment.orbit import orbit_position
 from mjspace.errors import InputError
 from mjspace.scenario.environment import Environment

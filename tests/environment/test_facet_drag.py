@@ -11,7 +11,7 @@ from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.environment import kepler
 from mjspace.environment.constants import RADIUS
-from mjspace.environment.dipole import EARTH_ROTATION
+from mjspace.environment.earth_rotation import EARTH_ROTATION
 from mjspace.environment.facet_drag import ATMOSPHERE, FacetDrag
 from mjspace.environment.facets import Facet
 from mjspace.environment.install import install_callbacks, userdata, userdata_size

@@ -8,8 +8,9 @@ from pydantic import ValidationError
 
 from mjspace import attitude
 from mjspace.contract import Array
-from mjspace.environment import dipole, kepler
-from mjspace.environment.geomagnetism import along, field_at, sidereal_angle
+from mjspace.environment import kepler
+from mjspace.environment.earth_rotation import EARTH_ROTATION, sidereal_angle
+from mjspace.environment.geomagnetism import along, field_at
 from mjspace.environment.magnetic_field import MagneticField
 from mjspace.environment.orbit import Orbit
 from mjspace.scenario.environment import Environment
@@ -40,7 +41,7 @@ def test_reference_field(
     radius: float, colatitude: float, longitude: float, nanotesla: list[float]
 ) -> None:
     time = 4000.0
-    turned = sidereal_angle(NEW_YEAR) + dipole.EARTH_ROTATION * time
+    turned = sidereal_angle(NEW_YEAR) + EARTH_ROTATION * time
     axes, up = inertial(colatitude, longitude, turned)
     field = field_at(IGRF, NEW_YEAR, 1e3 * radius * up[None], np.array([time]))[0]
     # the same coefficients: rounding
@@ -55,7 +56,7 @@ def test_sidereal_time_is_that_of_the_older_formula() -> None:
         angle = sidereal_angle(date)
         assert np.cos(angle - 2.0 * np.pi * seconds / 86400.0) > np.cos(1e-5)
         noon = sidereal_angle(date.replace(hour=12))
-        half_a_day = dipole.EARTH_ROTATION * 43200.0
+        half_a_day = EARTH_ROTATION * 43200.0
         assert np.cos(noon - angle - half_a_day) == pytest.approx(1.0, abs=1e-12)
 
 

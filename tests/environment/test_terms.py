@@ -36,12 +36,13 @@ def test_kinds_of_blocks_are_those_of_logs() -> None:
         12: "magnetic",
         13: "drag_along",
         14: "vibrate",
+        15: "magnetize",
     }
 
 
 def test_two_terms_of_one_kind_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TorqueRipple, "kernels", {6: None})
-    message = "CentralGravity and TorqueRipple both have blocks of kind 6: 15 is free"
+    message = "CentralGravity and TorqueRipple both have blocks of kind 6: 16 is free"
     with pytest.raises(ValueError, match=message):
         terms.kernels()
 

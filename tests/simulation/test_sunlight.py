@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from mjspace import attitude
 from mjspace.environment import sun
 from mjspace.environment.constants import ASTRONOMICAL_UNIT, RADIUS, SUN_RADIUS
-from mjspace.environment.geomagnetism import sidereal_angle
+from mjspace.environment.earth_rotation import sidereal_angle
 from mjspace.environment.magnetic_field import MagneticField
 from mjspace.environment.orbit import Orbit, orbit_position
 from mjspace.runner.replay import verify
