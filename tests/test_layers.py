@@ -39,7 +39,7 @@ ROOMS = {
     "scenario": "contract errors ranges units",
     "tracing": "gufunc",
     "vehicle": "contract errors scenario",
-    "environment": "contract errors scenario vehicle",
+    "environment": "contract errors gufunc scenario vehicle",
     "sensors": "attitude contract errors gufunc scenario units",
     "actuators": ("contract environment errors gufunc scenario sensors signals units vehicle"),
     "log": "attitude contract errors scenario signals units",

@@ -7,7 +7,7 @@ covariance as it is: it would change by the product of two small angles.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from mjspace.attitude import from_rotation_vector, normalize, to_matrix
 from mjspace.contract import Array, Gains, Measurement, Unit, gain
 
 from .error_state import attitude_error, corrected, mean_rate, seen_from, turned
+from .samples import is_new, is_sample
 from .vector_observations import covariance, q_method
 
 ATTITUDE, BIAS = slice(0, 3), slice(3, 6)
@@ -151,13 +152,13 @@ class MEKF(Gains):
         squares, begin = [], 0
         if self.attitude_noise:
             sample = measurement.attitude
-            fresh = _is_new("attitude", sample, last[..., :4], measurement)
+            fresh = is_new("attitude", measurement, last[..., :4])
             H[..., ATTITUDE] = np.eye(3)
             x, P, square = corrected(x, P, H, attitude_error(q, sample), self.attitude_noise, fresh)
             squares, begin = [square], 4
         for quantity, inertial, noise in self._vectors(measurement):
             sample = getattr(measurement, quantity)
-            fresh = _is_new(quantity, sample, last[..., begin : begin + 3], measurement)
+            fresh = is_new(quantity, measurement, last[..., begin : begin + 3])
             expected = seen_from(q, inertial)
             # A rotation theta changes R^T r by expected x theta.
             H[..., ATTITUDE] = cross_matrix(expected)
@@ -191,7 +192,7 @@ class MEKF(Gains):
         for quantity, known, noise in vectors:
             sample = getattr(measurement, quantity)
             size = np.sqrt(dot(known, known))
-            good = _is_sample(quantity, sample, measurement)
+            good = is_sample(quantity, measurement)
             body.append(normalize(np.where(good, sample, 1.0)))
             inertial.append(known / size)
             relative = noise if quantity == "sun_direction" else noise / size
@@ -202,17 +203,3 @@ class MEKF(Gains):
         spread = covariance(b, np.where(good, w, 1.0))
         spread = np.where(good[..., None], spread, UNKNOWN**2 * np.eye(3))
         return q_method(b, r, w), spread
-
-
-def _is_sample(quantity: str, sample: Array, measurement: Measurement) -> Any:
-    """Return whether the sensor reports anything, (..., 1)."""
-    is_sample: Any = np.any(sample != 0.0, axis=-1, keepdims=True)
-    valid = getattr(measurement, f"{quantity}_valid", None)
-    return is_sample if valid is None else is_sample & (valid > 0.5)
-
-
-def _is_new(quantity: str, sample: Array, last: Array, measurement: Measurement) -> Array:
-    """Return whether the sensor reports another sample than the ``last``, (..., 1)."""
-    changed = np.any(sample != last, axis=-1, keepdims=True)
-    is_new: Array = changed & _is_sample(quantity, sample, measurement)
-    return is_new

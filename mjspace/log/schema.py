@@ -24,6 +24,7 @@ PERIODIC = {
     "/state": "mjspace.State",
     "/truth": "mjspace.Truth",
     "/measurement": "mjspace.Measurement",
+    "/estimate": "mjspace.Estimate",
     "/reference": "mjspace.Reference",
     "/command": "mjspace.Command",
     "/law": "mjspace.LawSignals",
