@@ -63,6 +63,7 @@ class Curves:
 
 STANDARD = (
     Panel("Attitude error", "/truth", "attitude_error", log_scale=True),
+    Panel("Estimation error", "/truth", "estimation_error", names="xyz"),
     Panel("Body rate", "/truth", "rate", names="xyz", desired=DESIRED_RATE),
     Panel("Commanded torque on the bus", "/command", "torque", names="xyz"),
     Panel("Wheel motor torque", "/command", "wheel_torque"),

@@ -70,6 +70,10 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
             first, culprit = int(np.argmin(good)), name
     if not culprit:
         return block, ""
+    for name, values in block.rows.get("/estimate", {}).items():
+        if not np.isfinite(values[first]).all():
+            culprit = f"/estimate.{name}"  # of which the law made what acts
+            break
     problem = f"{culprit} is not finite, or beyond 1e10, at t = {block.time[first]:.6g} s"
     rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
     events = [event for event in block.events if event.time < block.time[first]]

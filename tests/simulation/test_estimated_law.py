@@ -226,6 +226,16 @@ Smooth.step = step
         flown(scenario(tmp_path, code), f"estimator.batched={batched}")
 
 
+def test_an_estimate_that_is_no_number_is_named(tmp_path: Path) -> None:
+    code = """
+def step(self, s, t, m):
+    return s, Estimate(m.attitude, np.where(t > 0.495, np.nan, m.rate), m.rate[..., :1])
+Smooth.step = step
+"""
+    with pytest.raises(FlightError, match=r"^/estimate\.rate is not finite.* at t = 0\.5 s"):
+        flown(scenario(tmp_path, code))
+
+
 def test_an_error_of_the_law_is_still_the_laws(tmp_path: Path) -> None:
     code = """
 def step(self, s, t, m, r):
