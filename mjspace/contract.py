@@ -47,6 +47,10 @@ class Measurement:
     """Velocity of the bus, body axes [m/s], shape (..., 3)."""
     magnetic_field: Annotated[Array, Unit("T")]
     """Of the Earth, body axes [T], shape (..., 3)."""
+    field_reference: Annotated[Array, Unit("T")]
+    """Of the Earth by the on-board model, inertial axes [T], shape (..., 3)."""
+    sun_reference: Array
+    """Unit vector to the Sun by the on-board almanac, inertial axes, shape (..., 3)."""
 
     # Reported by the plant: empty where the vehicle has nothing of the kind.
     wheel_speed: Annotated[Array, Unit("rad/s", display="rpm")] = _NONE
@@ -319,6 +323,26 @@ class Law(Protocol):
         self, state: Any, time: float, measurement: Measurement, reference: Any
     ) -> tuple[Any, Any, Any]:
         """Return (state, command, signals) for the control period that starts at ``time`` [s]."""
+
+
+class Estimator(Protocol):
+    """An estimator: gains in, two pure functions, no hidden state; it runs before the law.
+
+    ``state`` and ``estimate`` are named tuples of float64 arrays, as a law's state and signals are,
+    logged in /state and on /estimate. The law finds each field of the estimate in its measurement:
+    one that is called like a quantity, ``attitude`` or ``rate``, in place of what is measured, any
+    other beside it. ``batched``, ``compiled`` and read-only arrays are as of a ``Law``.
+    """
+
+    def reset(self, measurement: Measurement) -> Any:
+        """Return the estimator's state at the start of a flight.
+
+        The first ``step`` follows at the same instant, twice: for the law's ``reset``, with time 0,
+        and for its first step.
+        """
+
+    def step(self, state: Any, time: float, measurement: Measurement) -> tuple[Any, Any]:
+        """Return (state, estimate) at the control instant ``time`` [s]."""
 
 
 class ReferenceSource(Protocol):

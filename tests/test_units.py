@@ -63,7 +63,8 @@ def test_the_unit_of_a_plot(unit: Unit, displayed: tuple[str, float]) -> None:
 
 
 def test_the_laws_own_declarations_come_first() -> None:
-    found = topics.units({"/law": Signals, "/state": Signals, "/command": Signals})
+    kinds = {"/law": {"": Signals}, "/state": {"law_": Signals}, "/command": {"": Signals}}
+    found = topics.units(kinds)
     assert found["/law"] == units_of(Signals)
     assert found["/state"] == {"law_slip": Unit("m/s"), "law_stiffness": Unit("N/m")}
     assert found["/command"]["slip"] == Unit("m/s")

@@ -37,12 +37,12 @@ overrides any key.
 `base = "dgvscmg-tracking"` begins with another scenario, one that comes with mjspace or a file by
 its path from this file's folder (`base = "../calm.toml"`), and the rest of the file is what
 differs. Tables merge key by key; numbers and lists, `[[checks]]` among them, replace the base's. A
-`[law]` or `[reference]` of another `kind` starts afresh, with none of the base's gains, and so it
-does under `--set law.kind=...`, in whatever order the overrides stand. A base may have a base;
-`--set` comes last. A `duration` that is set on the command line leaves out the checks that begin
-after the flight's end, with a warning. Files that a base names are looked up from this file's
-folder, and those of mjspace's own scenarios beside them. What is logged is the whole, without
-`base`.
+`[law]`, `[reference]` or `[estimator]` of another `kind` starts afresh, with none of the base's
+gains, and so it does under `--set law.kind=...`, in whatever order the overrides stand. A base may
+have a base; `--set` comes last. A `duration` that is set on the command line leaves out the checks
+that begin after the flight's end, with a warning. Files that a base names are looked up from this
+file's folder, and those of mjspace's own scenarios beside them. What is logged is the whole,
+without `base`.
 """
 
 
@@ -69,7 +69,7 @@ def _described(table: type[BaseModel], key: str) -> str:
 
 def _laws() -> list[str]:
     """Return what may stand behind ``kind``, with its gains."""
-    lines = ["## Laws and references that come with mjspace", ""]
+    lines = ["## Laws, references and estimators that come with mjspace", ""]
     lines += ["| kind | gains (unit, range): default |", "|---|---|"]
     for short, full in sorted(controllers().items()):
         module = import_module(full)

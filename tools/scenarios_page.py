@@ -25,7 +25,7 @@ $ mjspace run detumble-wheels --duration 2 --set checks=[] --out detumble
 `mjspace info NAME` shows one with every default written out; [each key](scenario.md) can be set on
 the command line. Laws and references are listed [with their gains][laws].
 
-[laws]: scenario.md#laws-and-references-that-come-with-mjspace
+[laws]: scenario.md#laws-references-and-estimators-that-come-with-mjspace
 """
 
 

@@ -14,10 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mjspace.algebra import cross_matrix, dot, matrix_product, times, transpose
+from mjspace.algebra import cross_matrix, matrix_product, times, transpose
 from mjspace.attitude import from_rotation_vector, multiply, normalize, to_matrix
 from mjspace.contract import Array, Measurement, gain
 
+from ..determination.error_state import corrected, mean_rate, turned
 from .lander_gains import LunarGravity
 
 POSITION, VELOCITY, ATTITUDE, FORCE_BIAS, GYRO_BIAS = (slice(k, k + 3) for k in range(0, 15, 3))
@@ -102,7 +103,7 @@ class Navigation(LunarGravity):
         H = np.eye(15)[2:3]
         fresh = altitude != estimate.last_aid[..., :1]
         innovation = altitude - p[..., 2:]
-        x, P = _corrected(x, P, H, innovation, self.altimeter_noise, fresh)
+        x, P, _ = corrected(x, P, H, innovation, self.altimeter_noise, fresh)
 
         R_T = transpose(to_matrix(q))
         velocity_b = times(R_T, v)
@@ -112,7 +113,7 @@ class Navigation(LunarGravity):
         changed = ground_velocity != estimate.last_aid[..., 1:]
         fresh = np.any(changed, axis=-1, keepdims=True)
         innovation = ground_velocity - velocity_b
-        x, P = _corrected(x, P, H, innovation, self.velocimeter_noise, fresh)
+        x, P, _ = corrected(x, P, H, innovation, self.velocimeter_noise, fresh)
 
         p, v, b = p + x[..., POSITION], v + x[..., VELOCITY], b + x[..., BIAS]  # section 6.2
         q = normalize(multiply(q, from_rotation_vector(x[..., ATTITUDE])))
@@ -127,11 +128,11 @@ class Navigation(LunarGravity):
         p, v, q, b, P, last_rate, last_aid = estimate
         h = np.where(np.isinf(last_aid[..., :1]), 0.0, self.control_period)
         f = measurement.specific_force - b[..., :3]
-        w = 0.5 * (last_rate + measurement.rate) - b[..., 3:]
+        w = mean_rate(last_rate, measurement.rate, b[..., 3:])
         R = to_matrix(multiply(q, from_rotation_vector(0.5 * h * w)))
         v_ = v + h * (times(R, f) + self.gravity(p))
         p_ = p + 0.5 * h * (v + v_)
-        q_ = multiply(q, from_rotation_vector(h * w))
+        q_ = turned(q, w, h)
 
         A = np.zeros_like(P)  # of the errors' equations, section 5.3.3
         A[..., POSITION, VELOCITY] = np.eye(3)
@@ -159,23 +160,3 @@ class Navigation(LunarGravity):
         white = [0.0, self.accelerometer_noise, self.gyro_noise, 0.0, 0.0]
         walk = [0.0, 0.0, 0.0, self.accelerometer_walk, self.gyro_walk]
         return np.diag(np.repeat(white, 3) ** 2), np.diag(np.repeat(walk, 3) ** 2)
-
-
-def _corrected(
-    x: Array, P: Array, H: Array, innovation: Array, noise: float, fresh: Array
-) -> tuple[Array, Array]:
-    """Return the errors (..., 15) and P after m measurements, where ``fresh`` (..., 1).
-
-    ``H`` (m, 15) or (..., m, 15) is their sensitivity to the errors, ``innovation`` (..., m)
-    measured less predicted, ``noise`` the standard deviation of each. Section 6.1, one number at a
-    time, since their noises are independent: no matrix is inverted.
-    """
-    for i in range(H.shape[-2]):
-        row = H[..., i, :]
-        PH = times(P, row)
-        K = np.where(fresh, PH / (dot(row, PH) + noise**2), 0.0)
-        x, P = (
-            x + K * (innovation[..., i : i + 1] - dot(row, x)),
-            P - K[..., :, None] * PH[..., None, :],
-        )
-    return x, P

@@ -39,8 +39,9 @@ def load(scenario: str | Path, overrides: Iterable[str] = (), *, trust: bool = F
 
     ``overrides`` are ``"key=value"``, as ``--set`` takes them. Every episode is the same flight,
     that of member 0, on the stepper of a flight: the commands that a flight logged, as actions,
-    leave bit for bit the ``/state`` of that flight. An action takes the place of the law and of its
-    inner loop, and is held for one control period. Another ``seed`` gives other noise.
+    leave bit for bit the ``/state`` of that flight. An action takes the place of the estimator,
+    the law and its inner loop, and is held for one control period. Another ``seed`` gives other
+    noise.
     With ``trust`` the scenario may name files outside its folder and any installed module.
 
     Raises:
@@ -48,10 +49,11 @@ def load(scenario: str | Path, overrides: Iterable[str] = (), *, trust: bool = F
     """
     loaded, folder = loading.load(scenario, overrides)
     for number, fault in enumerate(loaded.faults):
-        if fault.when is not None and fault.when.signal.removeprefix("/").startswith("law."):
+        signal = "" if fault.when is None else fault.when.signal
+        if signal.removeprefix("/").startswith(("law.", "estimate.")):
             raise InputError(
-                f"faults.{number}.when.signal: {fault.when.signal}: an environment flies no law: "
-                "give a signal of truth, measurement or command"
+                f"faults.{number}.when.signal: {signal}: an environment flies no law: give a "
+                "signal of truth, measurement or command"
             )
     assembly = without_law(loaded, folder, trust=trust)
     return bridge.Environment(Physics(assembly), Tracking(assembly), n_sub_steps=loaded.rates.steps)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mjspace.environment.compiled import compiled
+from mjspace.gufunc import gufunc
 
 
 @compiled
@@ -41,13 +42,17 @@ def position(orbit: Any, time: float) -> tuple[float, float, float]:
     )
 
 
-@compiled
 def positions(rows: Any, times: Any) -> Any:
     """Return the positions [m], (n, 3), at ``times`` [s], (n,), with the elements ``rows``."""
-    found = np.empty((len(times), 3))
-    for i in range(len(times)):
-        found[i, 0], found[i, 1], found[i, 2] = position(rows[i], times[i])
-    return found
+    return _positions.ufunc(rows, times, _THREE)
+
+
+_THREE = np.zeros(3)  # an operand from which the position takes its shape
+
+
+@gufunc(["void(f8[:], f8, f8[:], f8[:])"], "(e),(),(v)->(v)")
+def _positions(row: Any, time: Any, _: Any, found: Any) -> None:
+    found[0], found[1], found[2] = position(row, time)
 
 
 @compiled

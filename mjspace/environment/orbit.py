@@ -297,7 +297,7 @@ def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
 
     ``time`` [s] of shape (...) gives positions of shape (..., 3).
     """
-    times = np.asarray(time, dtype=np.float64)
-    instants = times.ravel()
+    times = np.add(time, 0.0)
+    instants = np.ravel(times)
     positions = kepler.positions(orbit.rows(instants), instants)
     return np.reshape(positions, (*times.shape, 3))

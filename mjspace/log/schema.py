@@ -25,6 +25,7 @@ PERIODIC = {
     "/state": "mjspace.State",
     "/truth": "mjspace.Truth",
     "/measurement": "mjspace.Measurement",
+    "/estimate": "mjspace.Estimate",
     "/reference": "mjspace.Reference",
     "/command": "mjspace.Command",
     "/law": "mjspace.LawSignals",

@@ -23,6 +23,9 @@ class DerivedTruth:
 
     attitude_error: Annotated[Array, Unit("rad")]
     """Angle of the rotation from the desired to the true attitude, shape (1,)."""
+    estimation_error: Annotated[Array, Unit("rad")]
+    """Rotation vector from the estimated to the true attitude, body axes, shape (3,); where an
+    attitude is estimated."""
     position_error: Annotated[Array, Unit("m")]
     """True less desired position, inertial axes, shape (3,); where a position is desired."""
     tilt: Annotated[Array, Unit("rad")]
@@ -63,6 +66,7 @@ class Disturbance:
 DECLARED: Mapping[str, tuple[type, ...]] = {
     "/truth": (Truth, DerivedTruth),
     "/measurement": (Measurement,),
+    "/estimate": (Measurement,),
     "/reference": (Reference, Trajectory),
     "/command": (TorqueCommand, VoltageCommand, GimbalRateCommand, ThrustCommand, PulseCommand),
     "/disturbance": (Disturbance,),
@@ -71,18 +75,18 @@ DECLARED: Mapping[str, tuple[type, ...]] = {
 actuators for what they apply and measure."""
 
 
-def units(kinds: Mapping[str, type] = {}) -> dict[str, dict[str, Unit]]:
+def units(kinds: Mapping[str, Mapping[str, type]] = {}) -> dict[str, dict[str, Unit]]:
     """Return the unit of each field that has one, by topic.
 
-    ``kinds`` are the named tuples that a flight recorded on a topic, such as the law's signals on
-    ``/law``: what their fields declare comes before what the contract says of that name. Of
-    ``/state`` it is the law's state, whose fields are logged under ``law_<name>``.
+    ``kinds`` are the named tuples that a flight recorded on a topic, by what their fields' names
+    begin with there: of ``/state`` the law's state under ``law_``. What their fields declare comes
+    before what the contract says of that name.
     """
     found: dict[str, dict[str, Unit]] = {}
     for topic, declared in DECLARED.items():
         found[topic] = {name: unit for kind in declared for name, unit in units_of(kind).items()}
-    for topic, kind in kinds.items():
-        prefix = "law_" if topic == "/state" else ""
-        own = {prefix + name: unit for name, unit in units_of(kind).items()}
-        found[topic] = found.get(topic, {}) | own
+    for topic, by_prefix in kinds.items():
+        for prefix, each in by_prefix.items():
+            own = {prefix + name: unit for name, unit in units_of(each).items()}
+            found[topic] = found.get(topic, {}) | own
     return found

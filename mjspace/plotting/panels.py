@@ -81,6 +81,7 @@ TRANSLATION = (
 )
 ROTATION = (
     Panel("Attitude error", "/truth", "attitude_error", log_scale=True),
+    Panel("Estimation error", "/truth", "estimation_error", names="xyz"),
     Panel("Body rate", "/truth", "rate", names="xyz", desired=DESIRED_RATE),
 )
 STANDARD = (

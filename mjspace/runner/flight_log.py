@@ -26,10 +26,12 @@ _described: dict[bytes, tuple[bytes, Scene]] = {}
 """Of the last model, 10 MB."""
 
 
-def units_of(assembly: Assembly, kinds: Mapping[str, type] = {}) -> dict[str, dict[str, Unit]]:
+def units_of(
+    assembly: Assembly, kinds: Mapping[str, Mapping[str, type]] = {}
+) -> dict[str, dict[str, Unit]]:
     """Return the unit of each logged field by topic, as contract, law, actuators and sensors say.
 
-    ``kinds`` are the named tuples that the flight records, by topic.
+    ``kinds`` are the named tuples that the flight records, as ``topics.units`` takes them.
     """
     units = topics.units(kinds)
     for topic, declared in assembly.actuators.units.items():

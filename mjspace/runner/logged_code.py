@@ -13,13 +13,14 @@ from mjspace.scenario.trust import is_address
 def code_of(log: Log, scenario: Scenario, *, law: bool = True) -> dict[str, bytes]:
     """Return the files of the log that flying its ``scenario`` would run or read, by name.
 
-    Those are the files of the reference and the disturbance, where they came from no module, and
-    with ``law`` those of the law, which may be a shared library.
+    Those are the files of the reference, the estimator and the disturbance, where they came from no
+    module, and with ``law`` those of the law, which may be a shared library.
 
     Raises:
         ValueError: an attachment is damaged.
     """
     kinds = [scenario.reference.kind, scenario.environment.python or ""]
+    kinds += [scenario.estimator.kind] if scenario.estimator else []
     kinds += [scenario.law.kind] if law else []
     places = [kind.partition(":")[0] for kind in kinds]
     files = [place for place in places if place.endswith((".py", ".so"))]

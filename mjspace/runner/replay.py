@@ -26,9 +26,10 @@ from mjspace.scenario.trust import is_address
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.flight_software.socket_law import ROUND_TRIP
 from mjspace.simulation.initial_state import Start, first_start, start_at, state_of_log
+from mjspace.simulation.joined import names_in_state
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block, Rows, one_vehicle, shapes
-from mjspace.simulation.user_code import reference_at
+from mjspace.simulation.user_code import LocatedError, reference_at
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,9 @@ def replay(
     """Fly a log again from time ``start`` [s] into a new log, ``flight.mcap`` in ``out``.
 
     ``law`` is another law, ``"module:Class"`` or ``"file.py:Class"``, with ``gains`` as
-    ``"key=value"``; its files are looked up from ``folder``. Its state begins at ``start``, and the
-    checks and events of the logged law's signals are left out. Code out of the log runs with
-    ``trust`` alone.
+    ``"key=value"``; its files are looked up from ``folder``. Its state, and that of an estimator,
+    begins at ``start``, and the checks and events of the logged law's signals are left out. Code
+    out of the log runs with ``trust`` alone.
 
     Raises:
         InputError: no such log, time, law or gain; ``out`` holds the log itself, or another that
@@ -213,10 +214,12 @@ def start_of(log: Log, assembly: Assembly, time: float, *, fresh_law: bool = Fal
             template = assembly.law.reset(
                 measurement, type(desired)(*(values[0] for values in desired))
             )
+        except LocatedError as error:
+            raise InputError(f"log: {error}") from error
         except BaseException as error:
             raise InputError(f"log: {failure('the law', error)}") from error
         fields = getattr(template, "_fields", ())
-        names = [logged_name(f"law_{field}", state) for field in fields]
+        names = [logged_name(name, state) for name in names_in_state(type(template))]
         missing = [field for field, name in zip(fields, names, strict=True) if name not in state]
         if missing:
             raise InputError(f"the log has no state {missing[0]!r} for this law: another flew")

@@ -24,6 +24,7 @@ class LogRates(Table):
     """Where a replay can start."""
     truth: LogPeriod | None = None
     measurement: LogPeriod | None = None
+    estimate: LogPeriod | None = None
     reference: LogPeriod | None = None
     command: LogPeriod | None = None
     law: LogPeriod | None = None

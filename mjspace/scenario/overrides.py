@@ -8,14 +8,14 @@ from mjspace.errors import InputError, is_plain
 from mjspace.scenario import raw
 from mjspace.scenario.trust import CommandLineText
 
-_COMPONENTS = ("law", "reference")
+_COMPONENTS = ("law", "reference", "estimator")
 
 
 def apply(table: dict[str, Any], overrides: Iterable[str], option: str = "--set") -> dict[str, str]:
     """Set each ``key=value``, a dotted key and a TOML value, in ``table``; a bare word is a string.
 
-    Another ``kind`` of a law or a reference takes the table's gains away, those of another class;
-    the other overrides come after it, wherever they stand.
+    Another ``kind`` of a law, a reference or an estimator takes the table's gains away, those of
+    another class; the other overrides come after it, wherever they stand.
 
     Returns:
         The option that set each key, for messages.
@@ -63,7 +63,7 @@ def _turn(key: str) -> tuple[bool, int]:
 
 
 def _is_kind(key: str) -> bool:
-    """Return whether the key says of which class a law or a reference is, inside one or not."""
+    """Return whether the key says of which class such a component is, inside one or not."""
     parts = key.split(".")
     return len(parts) > 1 and parts[0] in _COMPONENTS and parts[-1] == "kind"
 

@@ -31,7 +31,7 @@ _MOST_STEPS = 100_000  # in a control period: seconds of wall time
 
 
 class Component(BaseModel):
-    """A law or a reference: ``kind`` names a class, every other key is one of its gains."""
+    """A law, reference or estimator: ``kind`` names a class, all other keys are its gains."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
@@ -177,6 +177,8 @@ class Scenario(Table):
     sensors: Sensors = Field({}, validate_default=True)
     """By name. Attitude, rate and wheel speed are measured ideally where no sensor is declared."""
     reference: Component
+    estimator: Component | None = None
+    """What the law sees in place of the measurement; none when left out: it sees the sensors."""
     law: Component
     faults: list[Annotated[Any, DeclaredIn("mjspace.actuators.faults:Fault", optional=False)]] = []
     checks: list[Check] = []

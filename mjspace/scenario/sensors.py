@@ -20,6 +20,9 @@ KINDS = {
     "ground_velocity": "mjspace.sensors.velocimeter:Velocimeter",
     "specific_force": "mjspace.sensors.accelerometer:Accelerometer",
     "magnetic_field": "mjspace.sensors.magnetometer:Magnetometer",
+    "field_reference": "mjspace.sensors.field_reference:FieldReference",
+    "sun_direction": "mjspace.sensors.sun_sensor:SunSensor",
+    "sun_reference": "mjspace.sensors.sun_reference:SunReference",
     "nadir": "mjspace.sensors.horizon:HorizonSensor",
     "model": "mjspace.sensors.model_sensor:OfModel",
 }

@@ -6,6 +6,7 @@ from typing import ClassVar, Self
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array
 from mjspace.simulation.assembly import Assembly
+from mjspace.simulation.joined import topics_of
 from mjspace.vehicle.step_effect import Instant, State, StepEffect, Topics
 
 
@@ -37,7 +38,7 @@ class ActuatorFaults(StepEffect):
             "truth": instant.truth,
             "measurement": instant.measurement,
             "command": instant.command,
-            "law": instant.signals,
+            **topics_of(instant.signals),
         }
         memory, events = self._faults.decide(memory, instant.time, topics)
         instant.events.extend(events)

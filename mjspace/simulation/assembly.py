@@ -16,13 +16,14 @@ from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.environment.ephemeris import KnownEphemeris
 from mjspace.environment.install import userdata, userdata_size
 from mjspace.environment.orbit import orbit_position
-from mjspace.errors import input_error_at
+from mjspace.errors import InputError, input_error_at
 from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
+from mjspace.simulation.estimated_law import EstimatedLaw
 from mjspace.simulation.known_beforehand import Known, known_of, seen_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
@@ -31,6 +32,7 @@ from mjspace.vehicle.vehicle import Vehicle, build, driven_by, initial_state
 METHODS = {
     "law": ("reset(measurement, reference)", "step(state, time, measurement, reference)"),
     "reference": ("at(time)",),
+    "estimator": ("reset(measurement)", "step(state, time, measurement)"),
 }
 """What a component must have."""
 MODEL = "model"
@@ -56,13 +58,14 @@ class Assembly:
     actuators: ActuatorSet
     reference: ReferenceSource
     law: Law
+    """With the estimator, where there is one: ``EstimatedLaw``."""
     inner: bool
     """Whether the law's inner loop commands the actuators in every integration step."""
     disturbance: Callable[..., tuple[Any, Any]] | None
     """The user's own Python disturbance."""
     sources: dict[str, bytes]
-    """The files that define the law, the reference and the disturbance, as ``law.py``, and with
-    what it needs of its folder in ``law/``: by their names in a log."""
+    """The files that define law, estimator, reference and disturbance, as ``law.py``, and with what
+    it needs of its folder in ``law/``: by their names in a log."""
 
     def sensors(self, members: Sequence[int]) -> SensorSuite:
         """Return the sensors of these members of the campaign, each with its own random streams."""
@@ -140,6 +143,11 @@ def assemble(
     """
     own = Trust(folder, everything=trust)
     of_law = own if law_folder is None else Trust(law_folder, everything=True)
+    if scenario.estimator and (is_library(scenario.law.kind) or is_address(scenario.law.kind)):
+        raise InputError(
+            "estimator: a law in a shared library or in another process sees the sensors alone: "
+            "leave out [estimator], or name a law in Python"
+        )
     if is_library(scenario.law.kind):
         from mjspace.simulation.flight_software import shared_library  # which needs an Assembly
 
@@ -167,6 +175,17 @@ def assemble(
     reference, flown["reference"] = _component("reference", scenario.reference, facts, own, sources)
     _part("reference", reference.at, np.array([0.0, scenario.duration]))
     inner = _part("law", _has_inner_loop, law)
+    if scenario.estimator is not None:
+        if inner:
+            raise InputError(
+                f"estimator: the inner loop of {scenario.law.kind} sees the sensors in every "
+                "integration step, where nothing is estimated: leave out [estimator], or name a "
+                "law without an inner loop"
+            )
+        estimator, flown["estimator"] = _component(
+            "estimator", scenario.estimator, facts, own, sources
+        )
+        law = EstimatedLaw(estimator, law)
     disturbance = None
     kind = scenario.environment.python
     if kind is not None:
@@ -207,10 +226,12 @@ def assemble(
 def without_law(scenario: Scenario, folder: Path, *, trust: bool = False) -> Assembly:
     """Return the scenario's assembly under a law that commands nothing, with no source of it.
 
+    What would estimate for the law is left out as well.
+
     Raises:
         InputError: as ``assemble``.
     """
-    still = scenario.model_copy(update={"law": Component(kind="coast:Coast")})
+    still = scenario.model_copy(update={"law": Component(kind="coast:Coast"), "estimator": None})
     assembly = assemble(still, folder, trust=trust)
     sources = {name: text for name, text in assembly.sources.items() if name != "law.py"}
     return replace(assembly, sources=sources)
@@ -244,7 +265,10 @@ def facts_of(vehicle: Vehicle, scenario: Scenario) -> dict[str, Any]:
 def _component(
     role: str, component: Component, facts: dict[str, Any], trust: Trust, sources: dict[str, bytes]
 ) -> tuple[Any, Component]:
-    """Return the law or reference and its table as flown; its files are added to ``sources``."""
+    """Return the law, reference or estimator, and its table as flown.
+
+    Its files are added to ``sources``.
+    """
     with input_error_at(role):
         kind = trust.load_class(component.kind, METHODS[role])
         built, flown = construct(component, kind, facts, trust)

@@ -17,6 +17,7 @@ from mjspace.interrupts import Interrupted
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.hidden_memory import refusing_hidden_memory
+from mjspace.simulation.joined import topics_of
 from mjspace.simulation.period_program import PeriodProgram, Recorded, Section
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.traced_arrays import TracedArrays, changes, tuple_like
@@ -222,7 +223,7 @@ class _Tracing(TracedArrays):
         if not waiting:
             return np.zeros(0)
         topics = {"truth": self._truth(), "measurement": measurement}
-        topics |= {"command": command, "law": signals}
+        topics |= {"command": command, **topics_of(signals)}
         memory = self.traced_arrays(self.memory)
         return self._report([effect.alarm(memory, topics) for effect in waiting])
 

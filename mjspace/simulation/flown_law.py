@@ -9,7 +9,7 @@ from mjspace.contract import Array, DesiredMotion, Law, Measurement
 from mjspace.errors import failure
 from mjspace.simulation.unbatched_law import UnbatchedLaw, stacked
 from mjspace.simulation.user_code import (
-    ReturnError,
+    LocatedError,
     check_inner,
     check_same_shapes,
     check_state,
@@ -111,7 +111,7 @@ class FlownLaw:
         """
         try:
             returned = self._law.inner(self.state, time, command, measurement)
-        except ReturnError:
+        except LocatedError:
             raise
         except BaseException as error:
             raise failure("the law's inner loop", error) from error
@@ -132,7 +132,9 @@ class FlownLaw:
             self._check_shapes(returned, self._first)
 
     def _check_shapes(self, returned: Any, first: Any) -> None:
-        for name, part, before in zip(_PARTS, returned, first, strict=True):
+        named = zip(_PARTS, returned, first, strict=True)
+        # The command comes last: it may be otherwise because an estimate is.
+        for name, part, before in sorted(named, key=lambda each: each[0] == "command"):
             check_same_shapes(name, part, before)
 
 
@@ -149,7 +151,7 @@ def _called(method: Callable[..., Any], *arguments: Any) -> Any:
     """
     try:
         return method(*arguments)
-    except ReturnError:
+    except LocatedError:
         raise
     except BaseException as error:
         raise failure("the law", error) from error

@@ -29,24 +29,40 @@ def refusing_hidden_memory(law: Any) -> Iterator[Any]:
     """
     if not getattr(law, "compiled", True):
         raise Untraceable("the law says compiled = False")
-    variables = getattr(type(law).step, "__globals__", {})
+    modules = list(_modules_of(law))
     kept = (*_VALUES, *_COLLECTIONS, dict, np.ndarray)
     try:
         called = copy.deepcopy(law)
-        before = {n: copy.deepcopy(v) for n, v in variables.items() if isinstance(v, kept)}
+        before = [
+            {n: copy.deepcopy(v) for n, v in variables.items() if isinstance(v, kept)}
+            for variables in modules
+        ]
     except Exception as error:
         raise Untraceable(f"the law cannot be copied: {type(error).__name__}: {error}") from error
     try:
         yield called
     finally:
-        changed = [name for name, value in before.items() if not _same(variables.get(name), value)]
-        variables.update({name: before[name] for name in changed})
+        changed: list[str] = []
+        for variables, values in zip(modules, before, strict=True):
+            own = {n: v for n, v in values.items() if not _same(variables.get(n), v)}
+            variables.update(own)
+            changed += own
     if changed:
         raise Untraceable(f"the law changes {changed[0]} of its module")
     mine, its = (getattr(each, "__dict__", {}) for each in (law, called))
     for name in mine.keys() & its.keys():  # others are computed at their first use
         if not _same(its[name], mine[name]):
             raise Untraceable(f"the law changes its own {name}")
+
+
+def _modules_of(law: Any) -> Iterator[dict[str, Any]]:
+    """Yield the variables of the law's module, and of those of the laws and estimators in it."""
+    seen: list[dict[str, Any]] = []
+    for each in (law, *getattr(law, "__dict__", {}).values()):
+        variables = getattr(getattr(type(each), "step", None), "__globals__", None)
+        if variables is not None and not any(variables is other for other in seen):
+            seen.append(variables)
+            yield variables
 
 
 def _same(one: Any, other: Any, depth: int = _DEPTH) -> bool:

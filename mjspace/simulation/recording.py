@@ -9,6 +9,7 @@ import numpy as np
 
 from mjspace import attitude
 from mjspace.contract import Array, DesiredMotion, Event, Measurement
+from mjspace.simulation import joined
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.state_layout import StateLayout
@@ -31,8 +32,9 @@ class Block:
     time: Array
     rows: Rows
     events: list[Event]
-    kinds: dict[str, type] = field(default_factory=dict)
-    """The named tuple that was recorded on a topic, of those that users' code returns."""
+    kinds: dict[str, dict[str, type]] = field(default_factory=dict)
+    """The named tuples that were recorded on a topic, of those that users' code returns, by what
+    their fields' names begin with there."""
 
 
 def one_vehicle(block: Block, vehicle: int = 0) -> Rows:
@@ -68,6 +70,10 @@ def until_trouble(block: Block, layout: StateLayout) -> tuple[Block, str]:
             first, culprit = int(np.argmin(good)), name
     if not culprit:
         return block, ""
+    for name, values in block.rows.get("/estimate", {}).items():
+        if not np.isfinite(values[first]).all():
+            culprit = f"/estimate.{name}"  # of which the law made what acts
+            break
     problem = f"{culprit} is not finite, or beyond 1e10, at t = {block.time[first]:.6g} s"
     rows = {t: {f: v[:first] for f, v in fields.items()} for t, fields in block.rows.items()}
     events = [event for event in block.events if event.time < block.time[first]]
@@ -203,8 +209,11 @@ def block_of(
         of_effects |= effect.logged(memory, data)
     state = {"physics": physics}
     state |= {f"actuator_{name}": a for name, a in memory.items()}
-    state |= {f"law_{name}": a for name, a in columns["law"].items()}
+    of_state = joined.columns(columns.kinds["law"], columns["law"])
+    state |= {f"{who}_{n}": a for who, arrays in of_state.items() for n, a in arrays.items()}
     state |= {f"sensor_{name}": a for name, a in columns["sensors"].items()}
+    signals = joined.columns(columns.kinds["signals"], columns["signals"])
+    estimate = signals.get(joined.ESTIMATOR, {})
     environment = data[..., vehicle.environment]
     for wrench in columns["wrench"].values():
         environment = environment + wrench
@@ -222,8 +231,10 @@ def block_of(
             "attitude_error": attitude.rotation_angle(truth.attitude, desired["attitude"])[
                 ..., None
             ],
+            **_estimation_error(truth.attitude, estimate),
         },
         "/measurement": columns["measurement"],
+        "/estimate": estimate,
         "/reference": {
             name: np.broadcast_to(a, (n, physics.shape[1], a.shape[-1]))
             for name, a in desired.items()
@@ -232,16 +243,18 @@ def block_of(
             **columns["command"],
             **assembly.actuators.logged(columns["applied"].values()),
         },
-        "/law": columns["signals"],
+        "/law": signals[joined.LAW],
         "/disturbance": {"force": environment[..., :3], "torque": environment[..., 3:]},
     }
     time = (number + np.arange(n, dtype=float)) * assembly.scenario.rates.control
     events = _saturation_events(time, columns.saturated, saturated_before, vehicle.motors)
+    of_signals = joined.kinds(columns.kinds["signals"])
     kinds = {
-        "/state": columns.kinds["law"],
-        "/reference": type(reference),
-        "/command": columns.kinds["command"],
-        "/law": columns.kinds["signals"],
+        "/state": {f"{who}_": kind for who, kind in joined.kinds(columns.kinds["law"]).items()},
+        "/estimate": {"": of_signals.get(joined.ESTIMATOR, tuple)},
+        "/reference": {"": type(reference)},
+        "/command": {"": columns.kinds["command"]},
+        "/law": {"": of_signals[joined.LAW]},
     }
     logged = {topic: fields for topic, fields in rows.items() if fields}
     return Block(number, time, logged, events + columns.events, kinds)
@@ -259,6 +272,14 @@ def _position_errors(
     lean = np.sqrt(quaternion[..., 1] ** 2 + quaternion[..., 2] ** 2)
     tilt = 2.0 * np.arcsin(np.minimum(lean, 1.0))
     return {"position_error": position - reference["position"], "tilt": tilt[..., None]}
+
+
+def _estimation_error(quaternion: Array, estimate: dict[str, Array]) -> dict[str, Array]:
+    """Return, where an attitude is estimated, the rotation vector [rad] from it to the true one."""
+    if "attitude" not in estimate:
+        return {}
+    error = attitude.multiply(attitude.conjugate(estimate["attitude"]), quaternion)
+    return {"estimation_error": attitude.to_rotation_vector(error)}
 
 
 def _without_empty(fields: dict[str, Array]) -> dict[str, Array]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mjspace.contract import DesiredMotion, Law, Measurement
+from mjspace.simulation.joined import of_whom
 from mjspace.simulation.user_code import ReturnError, check_inner, check_state, check_step
 
 
@@ -100,21 +101,21 @@ def _stack(name: str, tuples: Sequence[Any]) -> Any:
     Raises:
         ReturnError: a field is not numeric, or fields or shapes differ between vehicles.
     """
-    names = [getattr(one, "_fields", ()) for one in tuples]
-    for other in names[1:]:
-        if other != names[0]:
-            raise ReturnError(
-                f"the law's {name} has the fields {list(names[0])} for one vehicle and "
-                f"{list(other)} for another: it must return the same for all"
-            )
+    first = of_whom(name, tuples[0])
+    for one in tuples[1:]:
+        for whose, own in of_whom(name, one).items():
+            if own.keys() != first[whose].keys():
+                raise ReturnError(
+                    f"{whose} has the fields {list(first[whose])} for one vehicle and {list(own)} "
+                    "for another: it must return the same for all"
+                )
     if not tuples[0]:
         return ()
     fields = []
-    for field, column in zip(tuples[0]._fields, zip(*tuples, strict=True), strict=True):
+    labels = [f"{whose}.{field}" for whose, own in first.items() for field in own]
+    for label, column in zip(labels, zip(*tuples, strict=True), strict=True):
         try:
             fields.append(np.array(column, dtype=float))
         except (TypeError, ValueError) as error:
-            raise ReturnError(
-                f"the law's {name}.{field} is not an array of numbers: {error}"
-            ) from error
+            raise ReturnError(f"{label} is not an array of numbers: {error}") from error
     return type(tuples[0])(*fields)

@@ -7,6 +7,7 @@ import numpy as np
 
 from mjspace.contract import Array, DesiredMotion, Measurement, Reference, ReferenceSource
 from mjspace.errors import FlightError, failure
+from mjspace.simulation.joined import of_whom
 
 Tuple = TypeVar("Tuple", bound=Iterable[Any])
 
@@ -16,7 +17,11 @@ STEP = (
 )
 
 
-class ReturnError(FlightError):
+class LocatedError(FlightError):
+    """An error in users' code that says itself whose it is."""
+
+
+class ReturnError(LocatedError):
     """A law returned anything but what it must return."""
 
 
@@ -27,7 +32,7 @@ def read_only(arrays: Tuple) -> Tuple:
     change what has been logged.
     """
     for array in arrays:
-        while isinstance(array, np.ndarray):
+        while issubclass(type(array), np.ndarray):  # a traced array passes isinstance as well
             array.setflags(write=False)
             array = array.base
     return arrays
@@ -68,15 +73,15 @@ def reference_at(source: ReferenceSource, time: Array) -> DesiredMotion:
     return read_only(type(returned)(*(rows[:1] for rows in returned)) if alone else returned)
 
 
-def check_state(state: Any) -> None:
-    """Refuse what cannot be a law's state.
+def check_state(state: Any, whose: str = "law") -> None:
+    """Refuse what cannot be the state of a law or an estimator.
 
     Raises:
         ReturnError: neither a named tuple nor None.
     """
     if not _is_optional(state):
         raise ReturnError(
-            f"the law's reset returned {_described(state)}: it must return its state, a named "
+            f"the {whose}'s reset returned {_described(state)}: it must return its state, a named "
             "tuple of arrays, or None"
         )
 
@@ -103,6 +108,20 @@ def check_step(returned: Any) -> None:
             )
 
 
+def check_estimate(returned: Any) -> None:
+    """Refuse what an estimator's ``step`` must not return.
+
+    Raises:
+        ReturnError: anything but (state, estimate), with what it is instead.
+    """
+    good = type(returned) is tuple and len(returned) == 2
+    if not (good and _is_optional(returned[0]) and _is_named(returned[1])):
+        raise ReturnError(
+            f"the estimator's step returned {_described(returned)}: it must return (state, "
+            "estimate), each a named tuple of arrays; state may be None"
+        )
+
+
 def check_inner(returned: Any) -> None:
     """Refuse what a law's inner loop must not return.
 
@@ -123,14 +142,15 @@ def check_vehicle_axis(name: str, arrays: Any, vehicles: int) -> None:
     Raises:
         ReturnError: the first such field, with its shape.
     """
-    for field, shape in _by_name(arrays).items():
-        if not isinstance(getattr(arrays, field), np.ndarray):
-            raise ReturnError(f"the law's {name}.{field} must be an array, of a batched law")
-        if not shape or shape[0] != vehicles:
-            raise ReturnError(
-                f"the law's {name}.{field} has the shape {shape}: of a batched law it must begin "
-                f"with the vehicle axis, ({vehicles}, ...)"
-            )
+    for whose, fields in of_whom(name, arrays).items():
+        for field, array in fields.items():
+            if not isinstance(array, np.ndarray):
+                raise ReturnError(f"{whose}.{field} must be an array, of a batched law")
+            if not array.shape or array.shape[0] != vehicles:
+                raise ReturnError(
+                    f"{whose}.{field} has the shape {array.shape}: of a batched law it must begin "
+                    f"with the vehicle axis, ({vehicles}, ...)"
+                )
 
 
 def shapes_of(returned: Any) -> list[tuple[int, ...]] | None:
@@ -148,21 +168,20 @@ def check_same_shapes(name: str, arrays: Any, first: Any) -> None:
     Raises:
         ReturnError: with the fields or the shapes that differ.
     """
-    now, before = _by_name(arrays), _by_name(first)
-    if now.keys() != before.keys():
-        raise ReturnError(f"the law's {name} has the fields {list(now)} after {list(before)}")
-    for field, shape in now.items():
-        if shape != before[field]:
-            raise ReturnError(
-                f"the law's {name}.{field} has the shape {shape} after {before[field]}: shapes "
-                "must not change"
-            )
-
-
-def _by_name(arrays: Any) -> dict[str, tuple[int, ...]]:
-    """Return the shape of each field of a named tuple; nothing for None or an empty tuple."""
-    fields = getattr(arrays, "_fields", ())
-    return {field: np.shape(array) for field, array in zip(fields, arrays or (), strict=True)}
+    of_before = of_whom(name, first)
+    for whose, fields in of_whom(name, arrays).items():
+        now, before = (
+            {field: np.shape(array) for field, array in found.items()}
+            for found in (fields, of_before.get(whose, {}))
+        )
+        if now.keys() != before.keys():
+            raise ReturnError(f"{whose} has the fields {list(now)} after {list(before)}")
+        for field, shape in now.items():
+            if shape != before[field]:
+                raise ReturnError(
+                    f"{whose}.{field} has the shape {shape} after {before[field]}: shapes must not "
+                    "change"
+                )
 
 
 def _is_named(value: Any) -> bool:

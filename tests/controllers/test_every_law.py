@@ -50,8 +50,9 @@ def laws() -> list[str]:
 
 @functools.cache
 def flown() -> dict[str, str]:
-    """Return a scenario for each kind of law that one names."""
-    return {load(name)[0].law.kind: name for name in reversed(scenario_names())}
+    """Return a scenario for each kind of law that one names, where it sees the sensors."""
+    scenarios = {name: load(name)[0] for name in reversed(scenario_names())}
+    return {one.law.kind: name for name, one in scenarios.items() if one.estimator is None}
 
 
 class Watched:

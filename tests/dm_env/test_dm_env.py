@@ -155,7 +155,7 @@ def by_law(built: Assembly) -> Fly:
 
 def by_log(blocks: list[Block]) -> Fly:
     """Return what commands as a flight has logged."""
-    kind: Any = blocks[0].kinds["/command"]
+    kind: Any = blocks[0].kinds["/command"][""]
     columns = {name: joined(blocks, "/command", name) for name in kind._fields}
 
     def fly(step: TimeStep, number: int) -> Any:

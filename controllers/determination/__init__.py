@@ -1,0 +1,1 @@
+"""Attitude determination: estimates of attitude, rate and gyro bias from sensors."""
