@@ -16,6 +16,7 @@ TICK = 1e-9
 """s: instants that are closer than this are one; it is what the stamps of a log can tell apart."""
 
 
+_VALID = "_valid"
 _NONE = np.zeros(0)
 _NONE.setflags(write=False)
 
@@ -28,6 +29,9 @@ class Measurement:
     declared for it: ``measurement.attitude`` is ``measurement.st_1`` where ``st_1`` is the first of
     several star trackers. Reading a quantity that no sensor measures raises an AttributeError that
     names the table to add. Attributes cannot be assigned; ``_replace`` returns a changed copy.
+
+    Under ``<name>_valid``, of a sensor or a quantity, is 1.0 where the report is valid and 0.0
+    where it is not, shape (..., 1): 1.0 of a sensor that cannot tell.
     """
 
     attitude: Array
@@ -83,8 +87,17 @@ class Measurement:
         """
         if name.startswith("_"):
             raise AttributeError(name)
+        if name.endswith(_VALID):
+            return self._validity(name.removesuffix(_VALID))
         have = ", ".join(name for name, array in self.__dict__.items() if np.size(array))
         raise AttributeError(f"no sensor measures {name}: add [sensors.{name}] (measured: {have})")
+
+    def _validity(self, name: str) -> Array:
+        """Return whether what is reported under a ``name`` is valid."""
+        report = vars(type(self)).get(name)
+        if isinstance(report, _Report) and f"{report.sensor}{_VALID}" in self.__dict__:
+            return self.__dict__[f"{report.sensor}{_VALID}"]  # type: ignore[no-any-return]
+        return np.ones((*getattr(self, name).shape[:-1], 1))
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError("a measurement is read-only")

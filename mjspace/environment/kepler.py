@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mjspace.environment.compiled import compiled
+from mjspace.gufunc import gufunc
 
 
 @compiled
@@ -42,15 +43,6 @@ def position(orbit: Any, time: float) -> tuple[float, float, float]:
 
 
 @compiled
-def positions(rows: Any, times: Any) -> Any:
-    """Return the positions [m], (n, 3), at ``times`` [s], (n,), with the elements ``rows``."""
-    found = np.empty((len(times), 3))
-    for i in range(len(times)):
-        found[i, 0], found[i, 1], found[i, 2] = position(rows[i], times[i])
-    return found
-
-
-@compiled
 def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
     """Return the velocity [m/s], inertial axes, at ``time`` [s]; ``orbit`` as for ``position``."""
     anomaly = eccentric_anomaly(orbit[2] + orbit[1] * time, orbit[3])
@@ -61,3 +53,10 @@ def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
         along * orbit[5] + across * orbit[8],
         along * orbit[6] + across * orbit[9],
     )
+
+
+@gufunc(["void(f8[:], f8, f8[:], f8[:], f8[:])"], "(e),(),(v)->(v),(v)")
+def along(orbit: Any, time: Any, _: Any, place: Any, motion: Any) -> None:
+    """Fill in ``position`` and ``velocity`` at ``time``; the third is there for its length, 3."""
+    place[0], place[1], place[2] = position(orbit, time)
+    motion[0], motion[1], motion[2] = velocity(orbit, time)

@@ -13,8 +13,11 @@ from mjspace.actuators.actuator_set import ActuatorSet
 from mjspace.actuators.base import Context
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array, Law, ReferenceSource
+from mjspace.environment.constants import RADIUS
 from mjspace.environment.install import userdata, userdata_size
-from mjspace.environment.orbit import orbit_position
+from mjspace.environment.orbit import orbit_position, orbit_velocity
+from mjspace.environment.shadow import visible_from
+from mjspace.environment.solar_pressure import shadow_radii
 from mjspace.errors import input_error_at
 from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component, Scenario
@@ -72,12 +75,16 @@ class Assembly:
             scenario.seed,
             members,
             self.surroundings,
+            scenario.faults,
+            inner=self.inner,
         )
 
     @property
     def surroundings(self) -> Surroundings:
         """What the sensors need to know of the vehicle and of where it flies."""
-        orbit = self.scenario.environment.orbit
+        environment = self.scenario.environment
+        orbit = environment.orbit
+        radii = shadow_radii(environment)
         return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
             own_sensors={
@@ -86,6 +93,9 @@ class Assembly:
             | {f"{n}_closed": OwnSensor(1, "", False) for n in self.scenario.plant.connections},
             gravity=self._gravity,
             orbit_position=None if orbit is None else partial(orbit_position, orbit),
+            orbit_velocity=None if orbit is None else partial(orbit_velocity, orbit),
+            planet_radius=0.0 if orbit is None else RADIUS[orbit.body],
+            sunlight=lambda place, sun: visible_from(place, sun, *radii),
             **{name: one.at for name, one in seen_of(self.known).items()},
         )
 
@@ -110,8 +120,15 @@ class Assembly:
         scenario = self.scenario
         if not scenario.faults:
             return None
-        kinds = self.actuators.kinds
-        return FaultSet(scenario.faults, kinds, self.hold, scenario.seed, members)
+        return FaultSet(
+            scenario.faults,
+            self.actuators.kinds,
+            self.hold,
+            scenario.seed,
+            members,
+            scenario.rates.control,
+            list(scenario.sensors),
+        )
 
     def _gravity(self, position: Array) -> Array:
         """Return the central gravity [m/s^2] at ``position`` [m], both (..., 3)."""
@@ -197,8 +214,8 @@ def assemble(
         disturbance=disturbance,
         sources=sources,
     )
-    _part("sensors", assembly.sensors, [0])
     _part("faults", assembly.faults, [0])
+    _part("sensors", assembly.sensors, [0])
     return assembly
 
 

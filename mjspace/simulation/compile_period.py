@@ -14,6 +14,7 @@ import numpy as np
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
 from mjspace.interrupts import Interrupted
+from mjspace.sensors.fault_kinds import PHASE
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.hidden_memory import refusing_hidden_memory
@@ -81,10 +82,10 @@ class _Tracing(TracedArrays):
         self.law_state = tuple_like(example.law, map(self.held_of_one, example.law))
         self.sensors = self._held_arrays(example.sensors)
         suite = assembly.sensors([0])
-        self.biases = self._held_arrays(suite.biases)
+        self.constants = self._held_arrays(suite.constants)
         self.draws = self._held_arrays({name: a[0] for name, a in suite.draws([1]).items()})
         self.suite = suite.with_errors(
-            self.traced_arrays(self.biases), self.traced_arrays(self.draws)
+            self.traced_arrays(self.constants), self.traced_arrays(self.draws)
         )
         law = assembly.law
         self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
@@ -185,7 +186,7 @@ class _Tracing(TracedArrays):
             memory=self.memory,
             law=self.law_state,
             sensors=self.sensors,
-            biases=self.biases,
+            constants=self.constants,
             draws=self.draws,
             known=self.known,
             command=command,
@@ -282,7 +283,8 @@ class _Tracing(TracedArrays):
     def _sample(self) -> tuple[Any, Any]:
         """Return what the sensors remember after a sample, and the measurement."""
         sensors = self.traced_arrays(self.sensors)
-        sampled, measurement = self.suite.sample_where_due(sensors, self._truth())
+        phase = self.traced_arrays(self.memory).get(PHASE)
+        sampled, measurement = self.suite.sample_where_due(sensors, self._truth(), phase)
         before = tuple(self.sensors.values())
         return self.following(before, tuple(sampled[name] for name in self.sensors)), measurement
 

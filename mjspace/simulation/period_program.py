@@ -57,8 +57,8 @@ class PeriodProgram:
     """The law's state, a named tuple of arrays (1, ...), or empty."""
     sensors: dict[str, np.ndarray]
     """What the sensors remember, (1, ...)."""
-    biases: dict[str, np.ndarray]
-    """The constant bias of each sensor that is not ideal, (1, axes)."""
+    constants: dict[str, np.ndarray]
+    """What is constant of the errors of each sensor that is not ideal, (1, ...)."""
     draws: dict[str, np.ndarray]
     """Random numbers of a sample, (1, axes), as ``SensorSuite.draws`` names them."""
     known: tuple[np.ndarray, ...]
