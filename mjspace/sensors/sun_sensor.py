@@ -21,8 +21,9 @@ class SunSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
     """Fine Sun sensor: the unit vector from the bus to the Sun, body axes.
 
     Its errors are small rotations of that vector about the body axes. While the Sun is out of its
-    field of view, or more than half of the disc is in the Earth's shadow, it reports zeros, which
-    are not valid: ``measurement.<name>_valid``. Sunlight from the Earth is left out.
+    field of view, or more than half of the disc is in the Earth's shadow, it reports its last
+    vector again, which is not valid: ``measurement.<name>_valid``. Sunlight from the Earth is left
+    out.
     """
 
     measures: Literal["sun_direction"] = "sun_direction"
