@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import gcd
 from typing import Any
 
@@ -65,7 +66,7 @@ class Sampled:
     marks: Mapping[str, Any] = field(default_factory=dict)
     """For ``take_where_due``: of "due" and "arrives" 1.0 or 0.0, (1, 1); always where left out."""
 
-    @property
+    @cached_property
     def flagged(self) -> bool:
         """Whether its samples have a validity, as a last column."""
         return bool(self.faults) or not self.table.sees_always
@@ -88,17 +89,17 @@ class Sampled:
         ahead = {"markov": 1} if self.table.bias_instability else {}
         return {name: 0 for name, needed in of.items() if needed} | ahead | dict.fromkeys(lost, 0)
 
-    @property
+    @cached_property
     def samples_field(self) -> str:
         """Of its last samples, (N, k, width), the reported one first."""
         return f"{self.name}_samples"
 
-    @property
+    @cached_property
     def report_field(self) -> str:
         """Of what it reports, (N, k, width), first."""
         return f"{self.name}_report" if self._latest else self.samples_field
 
-    @property
+    @cached_property
     def _latest(self) -> int:
         return max((fault.late for fault in self.faults), default=0)
 
@@ -215,7 +216,7 @@ class Sampled:
                 report = np.where(at, state[arrived][:, then : then + 1], report)
         state[self.report_field] = report
 
-    @property
+    @cached_property
     def _drifts(self) -> list[Fault]:
         return [fault for fault in self.faults if fault.kind.per_second]
 
@@ -224,11 +225,11 @@ class Sampled:
     ) -> Array:
         """Return what sample ``index`` reports of the ``value``, with its validity if flagged."""
         table = self.table
-        faults, now = self.faults, [fault.in_force(phase) for fault in self.faults]
+        faults = [(fault, fault.in_force(phase)) for fault in self.faults]
         error = self.fixed["bias"]
         if self.noise:
             white = self.noise * table.weighted(self.draws["white"](index))
-            for fault, in_force in zip(faults, now, strict=True):
+            for fault, in_force in faults:
                 if (gain := fault.kind.gain(fault.value)) != 1.0:
                     white = white * np.where(in_force, gain, 1.0)
             error = error + white
@@ -237,7 +238,7 @@ class Sampled:
         if table.bias_instability:
             error = error + state[f"{self.name}_markov"]
         drifts = 0
-        for fault, in_force in zip(faults, now, strict=True):
+        for fault, in_force in faults:
             if fault.kind.of_axes:
                 since = np.zeros(1)
                 if fault.kind.per_second:
@@ -256,7 +257,7 @@ class Sampled:
             held = kept[:, -1, :-1]
             if table.holds:
                 sample = sample._replace(values=np.where(valid > 0.5, result, held))
-            for fault, in_force in zip(faults, now, strict=True):
+            for fault, in_force in faults:
                 lost: Any = None
                 if fault.kind.is_probability:
                     lost = self.draws[f"lost_{fault.number}"](index) < ndtri(fault.value)
