@@ -6,6 +6,11 @@ from typing import Annotated, Any, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from mjspace.commands import GimbalRateCommand as GimbalRateCommand
+from mjspace.commands import PulseCommand as PulseCommand
+from mjspace.commands import ThrustCommand as ThrustCommand
+from mjspace.commands import TorqueCommand as TorqueCommand
+from mjspace.commands import VoltageCommand as VoltageCommand
 from mjspace.ranges import Gains as Gains
 from mjspace.ranges import gain as gain
 from mjspace.units import Unit as Unit
@@ -16,6 +21,7 @@ TICK = 1e-9
 """s: instants that are closer than this are one; it is what the stamps of a log can tell apart."""
 
 
+_VALID = "_valid"
 _NONE = np.zeros(0)
 _NONE.setflags(write=False)
 
@@ -28,6 +34,9 @@ class Measurement:
     declared for it: ``measurement.attitude`` is ``measurement.st_1`` where ``st_1`` is the first of
     several star trackers. Reading a quantity that no sensor measures raises an AttributeError that
     names the table to add. Attributes cannot be assigned; ``_replace`` returns a changed copy.
+
+    Under ``<name>_valid``, of a sensor or a quantity, is 1.0 where the report is valid and 0.0
+    where it is not, shape (..., 1): 1.0 of a sensor that cannot tell.
     """
 
     attitude: Array
@@ -87,8 +96,17 @@ class Measurement:
         """
         if name.startswith("_"):
             raise AttributeError(name)
+        if name.endswith(_VALID):
+            return self._validity(name.removesuffix(_VALID))
         have = ", ".join(name for name, array in self.__dict__.items() if np.size(array))
         raise AttributeError(f"no sensor measures {name}: add [sensors.{name}] (measured: {have})")
+
+    def _validity(self, name: str) -> Array:
+        """Return whether what is reported under a ``name`` is valid."""
+        report = vars(type(self)).get(name)
+        if isinstance(report, _Report) and f"{report.sensor}{_VALID}" in self.__dict__:
+            return self.__dict__[f"{report.sensor}{_VALID}"]  # type: ignore[no-any-return]
+        return np.ones((*getattr(self, name).shape[:-1], 1))
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError("a measurement is read-only")
@@ -253,45 +271,6 @@ class Event(NamedTuple):
     level: str
     """``foxglove.Log``'s: DEBUG, INFO, WARNING, ERROR or FATAL."""
     message: str
-
-
-class TorqueCommand(NamedTuple):
-    """A law's command to the reaction wheels."""
-
-    torque: Annotated[Array, Unit("N m")]
-    """On the bus, body axes [N m], shape (..., 3)."""
-
-
-class VoltageCommand(NamedTuple):
-    """An inner loop's command to the motors' inverters."""
-
-    voltage: Annotated[Array, Unit("V")]
-    """(u_d, u_q) of each motor, in the rotor's axes [V], shape (..., m, 2); in the stator's, the
-    two windings', where the drive works in those."""
-
-
-class GimbalRateCommand(NamedTuple):
-    """A law's command to gimbals that have speed loops of their own."""
-
-    gimbal_rate: Annotated[Array, Unit("rad/s")]
-    """Relative to what carries each [rad/s], shape (..., g)."""
-
-
-class ThrustCommand(NamedTuple):
-    """A law's command to an engine on two gimbals."""
-
-    thrust: Annotated[Array, Unit("N")]
-    """[N], shape (..., 1)."""
-    gimbal: Annotated[Array, Unit("rad")]
-    """Angles of the hinges, the outer before the inner [rad], shape (..., 2)."""
-
-
-class PulseCommand(NamedTuple):
-    """A law's command to on/off thrusters."""
-
-    on_time: Annotated[Array, Unit("s")]
-    """For how long each is on, from the beginning of the control period or, of an inner loop, the
-    integration step [s], shape (..., n). A negative one shuts a valve."""
 
 
 class Law(Protocol):

@@ -79,6 +79,31 @@ UNITS: dict[str, tuple[str, float]] = {
     "N m/A": ("N m/A", 1.0),
     "mN m/A": ("N m/A", 1e-3),
     "V s/rad": ("N m/A", 1.0),
+    # Of data sheets: densities of noise, and random walks.
+    "rad/sqrt(Hz)": ("rad/sqrt(Hz)", 1.0),
+    "arcsec/sqrt(Hz)": ("rad/sqrt(Hz)", _DEG / 3600.0),
+    "rad/s/sqrt(Hz)": ("rad/s/sqrt(Hz)", 1.0),
+    "deg/s/sqrt(Hz)": ("rad/s/sqrt(Hz)", _DEG),
+    "deg/h/sqrt(Hz)": ("rad/s/sqrt(Hz)", _DEG / 3600.0),
+    "rad/sqrt(s)": ("rad/s/sqrt(Hz)", 1.0),
+    "deg/sqrt(s)": ("rad/s/sqrt(Hz)", _DEG),
+    "deg/sqrt(h)": ("rad/s/sqrt(Hz)", _DEG / 60.0),
+    "m/s^2/sqrt(Hz)": ("m/s^2/sqrt(Hz)", 1.0),
+    "ug/sqrt(Hz)": ("m/s^2/sqrt(Hz)", 9.80665e-6),
+    "m/s/sqrt(h)": ("m/s^2/sqrt(Hz)", 1.0 / 60.0),
+    "m/sqrt(Hz)": ("m/sqrt(Hz)", 1.0),
+    "m/s/sqrt(Hz)": ("m/s/sqrt(Hz)", 1.0),
+    "T/sqrt(Hz)": ("T/sqrt(Hz)", 1.0),
+    "nT/sqrt(Hz)": ("T/sqrt(Hz)", 1e-9),
+    "rad/s/sqrt(s)": ("rad/s/sqrt(s)", 1.0),
+    "deg/s/sqrt(s)": ("rad/s/sqrt(s)", _DEG),
+    "deg/h/sqrt(h)": ("rad/s/sqrt(s)", _DEG / 3600.0 / 60.0),
+    "m/s^2/sqrt(s)": ("m/s^2/sqrt(s)", 1.0),
+    "T/sqrt(s)": ("T/sqrt(s)", 1.0),
+    "nT/sqrt(s)": ("T/sqrt(s)", 1e-9),
+    "T/(A m^2)": ("T/(A m^2)", 1.0),
+    "nT/(A m^2)": ("T/(A m^2)", 1e-9),
+    "ppm": ("", 1e-6),
 }
 
 _SYMBOLS = {s for name in UNITS for s in re.split(r"[ /]", re.sub(r"\^\d+", "", name))} | {"1"}
@@ -154,7 +179,7 @@ def to_si(value: Any, unit: str | None) -> Any:
         return value
     if unit is None:
         return _any_to_si(value)
-    if not unit:
+    if not unit and value.split()[-1:] != ["ppm"]:
         raise ValueError(f"got the text {value!r}, should be a plain number")
     return quantity(value, unit)
 

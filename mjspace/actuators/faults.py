@@ -1,68 +1,92 @@
-"""Faults of actuators: what they apply is changed on its way to the vehicle, from a moment on."""
+"""Faults: what actuators apply, or sensors report, is changed on its way from a moment on."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from math import ceil
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from mjspace.actuators.base import Actuator, State
-from mjspace.actuators.fault_kinds import KINDS
+from mjspace.actuators.fault_kinds import KINDS, FaultKind
 from mjspace.contract import TICK, Array, Event
 from mjspace.errors import input_error_at, nearest
-from mjspace.scenario.fields import Finite, Seconds, Table, Time
+from mjspace.scenario.fields import AnyUnit, Finite, OneOrEach, Seconds, Table, Time
 from mjspace.scenario.region import Region
+from mjspace.sensors.fault_kinds import IN_FORCE, PHASE, STREAM
+from mjspace.sensors.fault_kinds import KINDS as OF_SENSORS
 from mjspace.sensors.noise import normals
 from mjspace.signals import find_signal, magnitude
-from mjspace.units import to_si
 
-STREAM = 1000
-"""First number of the faults' random streams; the sensors' are hashes of their names."""
-_WAITING, _IN_FORCE, _OVER = 0.0, 1.0, 2.0
-_WITH_VALUE = [name for name, kind in KINDS.items() if kind.has_value]
+_WAITING, _IN_FORCE, _OVER = 0.0, IN_FORCE, 2.0
+_KINDS = tuple({**KINDS, **OF_SENSORS})
+
+
+def _listed(kinds: Mapping[str, Any]) -> str:
+    return "; ".join(f"{name}, {kind.applies}" for name, kind in kinds.items())
 
 
 class Fault(Table):
-    """From a moment on a motor does not apply what its model says; the log mentions when."""
+    """From a moment on a motor does not apply, or a sensor report, what it should; events say so.
 
-    motor: str
+    One of ``motor`` and ``sensor`` is given.
+    """
+
+    motor: str | None = None
     """Its name, ``wheel_0`` or ``thruster_3``; or all of a kind, or one of them, as /command has
     them: ``thruster_thrust``, ``thruster_thrust[3]``, ``magnetic_moment[2]``."""
-    kind: Literal[*KINDS] = Field(  # type: ignore[valid-type]
-        description="It applies: "
-        + "; ".join(f"{name}, {kind.applies}" for name, kind in KINDS.items())
-        + "."
+    sensor: str | None = None
+    """Its name: that of its table in ``sensors``."""
+    kind: Literal[*_KINDS] = Field(  # type: ignore[valid-type]
+        description=f"A motor applies: {_listed(KINDS)}. A sensor reports: {_listed(OF_SENSORS)}."
     )
-    value: Finite | None = Field(
-        default=None, description=f"Of {', '.join(_WITH_VALUE)}; a number in SI or a quantity."
+    value: Annotated[float | list[Any], OneOrEach(Annotated[Finite, AnyUnit])] | None = Field(
+        default=None,
+        description="Of all kinds but dead and stuck: a number in SI or a quantity. Of a sensor "
+        "that is biased or drifting also one for each axis.",
     )
     at: Time | None = None
-    """When it begins: at the first integration step that is not before."""
+    """When it begins: at the first integration step, or of a sensor control instant, that is not
+    before."""
     when: Region | None = None
     """Or the first control period in which a signal is inside: one of ``truth`` as ideal sensors
     measure it, ``measurement``, ``command`` or ``law``."""
     until: Seconds | None = None
     """When it is over; never when left out."""
 
-    @field_validator("value", mode="before")
-    @classmethod
-    def _quantity(cls, value: Any) -> Any:
-        return to_si(value, None)
-
     @model_validator(mode="after")
     def _consistent(self) -> "Fault":
-        kind = KINDS[self.kind]
+        if (self.motor is None) == (self.sensor is None):
+            raise ValueError("motor and sensor: give one of them")
+        what, kinds = ("motor", KINDS) if self.sensor is None else ("sensor", OF_SENSORS)
+        if self.kind not in kinds:
+            raise ValueError(f"kind: a {what} is {', '.join(kinds)}, and not {self.kind}")
+        kind: Any = kinds[self.kind]
         if (self.value is not None) != kind.has_value:
             has = "one: give it" if kind.has_value else "none"
-            raise ValueError(f"value: a motor that is {self.kind} has {has}")
+            raise ValueError(f"value: a {what} that is {self.kind} has {has}")
+        if isinstance(self.value, list) and (self.motor is not None or not kind.of_axes):
+            raise ValueError("value: got a list, should be a number")
         if (self.at is None) == (self.when is None):
             raise ValueError("at and when: give one of them")
         if self.at is not None and self.until is not None and self.until <= self.at:
             raise ValueError(f"until {self.until:g} s is not after at {self.at:g} s")
-        if kind.is_positive and not (self.value or 0.0) > 0.0:
-            raise ValueError(f"value {self.value:g} of one that is {self.kind}: more than 0")
+        if kind.is_positive and not self.size > 0.0:
+            raise ValueError(f"value {self.size:g} of one that is {self.kind}: more than 0")
+        if self.sensor is not None and kind.is_probability and not 0.0 < self.size <= 1.0:
+            raise ValueError(f"value {self.size:g} of one that is {self.kind}: from 0 to 1")
         return self
+
+    @property
+    def size(self) -> float:
+        """The value where it is one number; 0 without."""
+        return self.value if isinstance(self.value, float) else 0.0
+
+    @property
+    def part(self) -> str:
+        """Whose fault it is, as events have it."""
+        return f"sensor {self.sensor}" if self.motor is None else self.motor
 
 
 @dataclass(frozen=True)
@@ -78,17 +102,30 @@ class _Place:
         return self.columns.stop - self.columns.start  # type: ignore[no-any-return]
 
 
+@dataclass(frozen=True)
+class _Motor:
+    """A fault of motors."""
+
+    kind: FaultKind
+    value: float
+    place: _Place
+    length: int  # of what is remembered
+    noise: Callable[[int], Array]
+
+
 def between(tables: Sequence[Fault], control: float) -> bool:
-    """Tell whether a fault begins or ends between control instants, ``control`` [s] apart."""
-    times = [time for fault in tables for time in (fault.at, fault.until) if time is not None]
+    """Tell whether a motor's begins or ends between control instants, ``control`` [s] apart."""
+    of_motors = [fault for fault in tables if fault.motor is not None]
+    times = [time for fault in of_motors for time in (fault.at, fault.until) if time is not None]
     return any(abs(time - control * round(time / control)) > TICK for time in times)
 
 
 class FaultSet:
     """The faults of a batch of vehicles; all memory is in ``State``.
 
-    A fault begins and ends with an integration step; one that depends on a signal begins with a
-    control period. Of several on one motor, each changes what those listed before it apply.
+    A motor's fault begins and ends with an integration step; a sensor's, and one that depends on a
+    signal, with a control period. Of several on one motor, each changes what those listed before it
+    apply. What is wrong with sensors is theirs to report: here it is decided when.
     """
 
     def __init__(
@@ -98,28 +135,36 @@ class FaultSet:
         hold: float,
         seed: int,
         members: Sequence[int],
+        control: float | None = None,
+        sensors: Sequence[str] = (),
     ) -> None:
-        """Find the motors; ``hold`` [s] is how long what actuators apply is held.
+        """Find the parts; ``hold`` [s] is how long what actuators apply is held.
+
+        ``control`` [s] is the control period, the ``hold`` when left out; ``sensors`` are those
+        that there are.
 
         Raises:
-            ValueError: no such motor, or a delay that is no whole number of holds.
+            ValueError: no such motor or sensor, or a delay that is no whole number of holds.
         """
         self._tables, self._kinds, self._hold = tables, kinds, hold
-        self._vehicles = len(members)
+        self._vehicles, self._control = len(members), control or hold
         known = _places(kinds)
-        self._places, self._noises = [], []
-        self._lengths = []  # of what is remembered of each
+        self._motors: dict[int, _Motor] = {}
         for number, fault in enumerate(tables):
+            if fault.sensor is not None and fault.sensor not in sensors:
+                near = nearest(fault.sensor, sensors)
+                raise ValueError(f"faults.{number}.sensor: none is called {fault.sensor!r}{near}")
+            if fault.motor is None:
+                continue
             if fault.motor not in known:
                 raise ValueError(
                     f"faults.{number}.motor: none is called {fault.motor!r}"
                     f"{nearest(fault.motor, known)}"
                 )
-            place, key = known[fault.motor], f"faults.{number}.value"
-            self._places.append(place)
-            self._lengths.append(KINDS[fault.kind].memory(fault.value or 0.0, hold, key))
-            width = place.width
-            self._noises.append(normals(seed, members, (STREAM + number,), width))
+            place, key, kind = known[fault.motor], f"faults.{number}.value", KINDS[fault.kind]
+            length = kind.memory(fault.size, hold, key)
+            noise = normals(seed, members, (STREAM + number,), place.width)
+            self._motors[number] = _Motor(kind, fault.size, place, length, noise)
 
     def reset(self) -> State:
         """Return the state at the start.
@@ -128,12 +173,19 @@ class FaultSet:
         "fault_<number>_past" (N, motors, k), what the motors of a delayed or stuck one should have
         applied, the newest last.
         """
-        state = {"fault_phase": np.full((self._vehicles, len(self._tables)), _WAITING)}
-        for number, length in enumerate(self._lengths):
-            if length:
-                width = self._places[number].width
-                state[f"fault_{number}_past"] = np.zeros((self._vehicles, width, length))
+        state = {PHASE: np.full((self._vehicles, len(self._tables)), _WAITING)}
+        for number, motor in self._motors.items():
+            if motor.length:
+                shape = self._vehicles, motor.place.width, motor.length
+                state[f"fault_{number}_past"] = np.zeros(shape)
         return state
+
+    def decide_for_sensors(self, state: State, now: float) -> tuple[State, list[Event]]:
+        """Return what ``decide`` does of sensors' faults that begin or end by the time.
+
+        Before the sensors sample at the control instant ``now`` [s].
+        """
+        return self._decide(state, now, None, [n for n, f in enumerate(self._tables) if f.sensor])
 
     def decide(
         self, state: State, now: float, measured: Mapping[str, Any] | None
@@ -146,30 +198,46 @@ class FaultSet:
         Raises:
             InputError: a fault depends on an unknown signal, with the near names.
         """
-        phase = state["fault_phase"].copy()
+        return self._decide(state, now, measured, range(len(self._tables)))
+
+    def _decide(
+        self, state: State, now: float, measured: Mapping[str, Any] | None, of: Sequence[int]
+    ) -> tuple[State, list[Event]]:
+        phase = state[PHASE].copy()
         happened = []
-        for number, fault in enumerate(self._tables):
+        for number in of:
+            fault = self._tables[number]
             over = fault.until is not None and now >= fault.until - TICK
             ends = over & (phase[:, number] == _IN_FORCE)
             begins = ~np.bool_(over) & (phase[:, number] == _WAITING)
             begins &= self._is_due(number, now, measured)
             phase[ends, number], phase[begins, number] = _OVER, _IN_FORCE
-            what = f"fault: {fault.motor} is {fault.kind}"
+            what = f"fault: {fault.part} is {fault.kind}"
             happened += [Event(now, int(v), "WARNING", what) for v in np.flatnonzero(begins)]
             happened += [
                 Event(now, int(v), "INFO", f"{what} no more") for v in np.flatnonzero(ends)
             ]
-        return state | {"fault_phase": phase}, happened
+        return state | {PHASE: phase}, happened
 
     @property
     def noisy(self) -> bool:
         """Whether a motor has noise."""
-        return any(KINDS[fault.kind].random for fault in self._tables)
+        return any(motor.kind.random for motor in self._motors.values())
+
+    @property
+    def of_sensors(self) -> bool:
+        """Whether one is of a sensor."""
+        return len(self._motors) < len(self._tables)
 
     def due(self, after: float) -> float:
         """Return the first time from ``after`` on at which one begins or ends [s]."""
-        times = (time for fault in self._tables for time in (fault.at, fault.until))
-        return min((t for t in times if t is not None and t >= after - TICK), default=np.inf)
+        times = [
+            time if fault.sensor is None else self._control * ceil((time - TICK) / self._control)
+            for fault in self._tables
+            for time in (fault.at, fault.until)
+            if time is not None
+        ]
+        return min((time for time in times if time >= after - TICK), default=np.inf)
 
     @property
     def waiting(self) -> bool:
@@ -181,7 +249,7 @@ class FaultSet:
 
         Array code; ``measured`` is that of ``decide``.
         """
-        phase, begins = state["fault_phase"], []
+        phase, begins = state[PHASE], []
         for number, fault in enumerate(self._tables):
             if fault.when is not None:
                 waits = phase[:, number] == _WAITING
@@ -193,12 +261,13 @@ class FaultSet:
     ) -> tuple[State, tuple[Array, ...]]:
         """Return (state, what the motors apply instead of ``applied``) from ``now`` [s] on."""
         state, result = state.copy(), list(applied)
-        for number, place in enumerate(self._places):
-            kind, right = KINDS[self._tables[number].kind], result[place.kind][:, place.columns]
+        for number, motor in self._motors.items():
+            kind, place = motor.kind, motor.place
+            right = result[place.kind][:, place.columns]
             field = f"fault_{number}_past"
             past = state.get(field)
-            wrong = self._faulty(number, right, past, now)
-            in_force = state["fault_phase"][:, number] == _IN_FORCE
+            wrong = self._faulty(motor, right, past, now)
+            in_force = state[PHASE][:, number] == _IN_FORCE
             if past is not None:
                 newest = np.concatenate([past[..., 1:], right[..., None]], axis=-1)
                 keeps = in_force & kind.remembers_begin
@@ -212,12 +281,11 @@ class FaultSet:
             )
         return state, tuple(result)
 
-    def _faulty(self, number: int, right: Array, past: Array | None, now: float) -> Array:
+    def _faulty(self, motor: "_Motor", right: Array, past: Array | None, now: float) -> Array:
         """Return what the fault's motors apply where it is in force, (N, motors)."""
-        fault = self._tables[number]
         oldest = np.zeros(0) if past is None else past[..., 0]
-        noise = lambda: self._noises[number](round(now / self._hold))  # noqa: E731
-        return KINDS[fault.kind].faulty(right, fault.value or 0.0, oldest, noise)
+        noise = lambda: motor.noise(round(now / self._hold))  # noqa: E731
+        return motor.kind.faulty(right, motor.value, oldest, noise)
 
     def _is_due(self, number: int, now: float, measured: Mapping[str, Any] | None) -> Any:
         fault = self._tables[number]

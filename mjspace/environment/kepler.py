@@ -42,19 +42,6 @@ def position(orbit: Any, time: float) -> tuple[float, float, float]:
     )
 
 
-def positions(rows: Any, times: Any) -> Any:
-    """Return the positions [m], (n, 3), at ``times`` [s], (n,), with the elements ``rows``."""
-    return _positions.ufunc(rows, times, _THREE)
-
-
-_THREE = np.zeros(3)  # an operand from which the position takes its shape
-
-
-@gufunc(["void(f8[:], f8, f8[:], f8[:])"], "(e),(),(v)->(v)")
-def _positions(row: Any, time: Any, _: Any, found: Any) -> None:
-    found[0], found[1], found[2] = position(row, time)
-
-
 @compiled
 def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
     """Return the velocity [m/s], inertial axes, at ``time`` [s]; ``orbit`` as for ``position``."""
@@ -66,3 +53,10 @@ def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
         along * orbit[5] + across * orbit[8],
         along * orbit[6] + across * orbit[9],
     )
+
+
+@gufunc(["void(f8[:], f8, f8[:], f8[:], f8[:])"], "(e),(),(v)->(v),(v)")
+def along(orbit: Any, time: Any, _: Any, place: Any, motion: Any) -> None:
+    """Fill in ``position`` and ``velocity`` at ``time``; the third is there for its length, 3."""
+    place[0], place[1], place[2] = position(orbit, time)
+    motion[0], motion[1], motion[2] = velocity(orbit, time)

@@ -257,29 +257,31 @@ class Orbit(Term):
         )
 
     def rows(self, time: Array) -> Array:
-        """Return the elements that hold at each ``time`` [s], (n,), as (n, 10).
+        """Return the elements that hold at each ``time`` [s], (...), as (..., 10).
 
         Raises:
             ValueError: SGP4 does not know the satellite then.
         """
         if self.tle:
-            return self._osculating(time)
-        rows = np.tile(self.elements(), (len(time), 1))
+            return self._osculating(np.ravel(time)).reshape(*time.shape, 10)
+        elements = self.elements()
         if not self.j2:
-            return rows
+            return np.broadcast_to(elements, (*time.shape, 10))
         node, periapsis, anomaly = self.drifts()
-        rows[:, 1] += anomaly
+        elements[1] += anomaly
+        major, minor = elements[4:7], elements[7:]
         shrink = math.sqrt(1.0 - self.eccentricity**2)
-        cosine, sine = np.cos(periapsis * time)[:, None], np.sin(periapsis * time)[:, None]
-        major, minor = rows[:, 4:7].copy(), rows[:, 7:].copy()
-        rows[:, 4:7] = cosine * major + sine / shrink * minor
-        rows[:, 7:] = cosine * minor - shrink * sine * major
-        cosine, sine = np.cos(node * time), np.sin(node * time)
-        for x in (4, 7):  # about the Earth's axis
-            turned = cosine * rows[:, x] - sine * rows[:, x + 1]
-            rows[:, x + 1] = sine * rows[:, x] + cosine * rows[:, x + 1]
-            rows[:, x] = turned
-        return rows
+        cosine, sine = np.cos(periapsis * time)[..., None], np.sin(periapsis * time)[..., None]
+        axes = (
+            cosine * major + sine / shrink * minor,
+            cosine * minor - shrink * sine * major,
+        )
+        cosine, sine = np.cos(node * time)[..., None], np.sin(node * time)[..., None]
+        parts = [np.broadcast_to(elements[:4], (*time.shape, 4))]
+        for axis in axes:  # about the Earth's axis
+            x, y, z = (axis[..., k : k + 1] for k in range(3))
+            parts += [cosine * x - sine * y, sine * x + cosine * y, z]
+        return np.concatenate(parts, axis=-1)
 
     def _osculating(self, time: Array) -> Array:
         """Return the elements at each ``time`` [s], (n,), from positions and velocities."""
@@ -297,7 +299,15 @@ def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
 
     ``time`` [s] of shape (...) gives positions of shape (..., 3).
     """
-    times = np.add(time, 0.0)
-    instants = np.ravel(times)
-    positions = kepler.positions(orbit.rows(instants), instants)
-    return np.reshape(positions, (*times.shape, 3))
+    return _along(orbit, time)[0]
+
+
+def orbit_velocity(orbit: Orbit, time: ArrayLike) -> Array:
+    """Return the velocity of the frame's origin, inertial axes [m/s], likewise."""
+    return _along(orbit, time)[1]
+
+
+def _along(orbit: Orbit, time: Any) -> tuple[Array, Array]:
+    times = time if hasattr(time, "shape") else np.asarray(time, dtype=np.float64)
+    found: tuple[Array, Array] = kepler.along.ufunc(orbit.rows(times), times, np.zeros(3))
+    return found

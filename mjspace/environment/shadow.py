@@ -6,9 +6,9 @@ The planet is a sphere without an atmosphere.
 import math
 from typing import Any
 
-import numpy as np
-
+from mjspace.contract import Array
 from mjspace.environment.compiled import compiled
+from mjspace.gufunc import gufunc
 
 
 @compiled
@@ -41,15 +41,16 @@ def visible(
     return 1.0 - overlap / (math.pi * a * a)
 
 
-@compiled
-def visible_at(places: Any, suns: Any, planet: float, disc: float) -> Any:
-    """Return ``visible`` for each row of ``places`` and of the Sun's positions ``suns``, (n, 3).
+def visible_from(place: Array, sun: Array, planet: float, disc: float) -> Array:
+    """Return ``visible`` at each ``place`` with the ``sun`` there, (..., 3), as (..., 1).
 
     Both are from the planet's centre.
     """
-    found = np.empty(len(places))
-    for i in range(len(places)):
-        x, y, z = places[i]
-        sx, sy, sz = suns[i]
-        found[i] = visible(x, y, z, sx - x, sy - y, sz - z, planet, disc)
-    return found
+    part: Array = _visible_from.ufunc(place, sun, planet, disc)
+    return part[..., None]
+
+
+@gufunc(["void(f8[:], f8[:], f8, f8, f8[:])"], "(v),(v),(),()->()")
+def _visible_from(place: Any, sun: Any, planet: Any, disc: Any, part: Any) -> None:
+    x, y, z = place[0], place[1], place[2]
+    part[0] = visible(x, y, z, sun[0] - x, sun[1] - y, sun[2] - z, planet, disc)

@@ -76,6 +76,16 @@ class Interval(Si):
 
 
 @dataclass(frozen=True)
+class Walk(Si):
+    """A random walk's deviation after one second; of a rate of walk, its number is the same."""
+
+    def _validated(self, value: Any, inner: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        if isinstance(value, str) and self.si:
+            value = quantity(value, self.si, f"{self.si}/sqrt(s)")
+        return super()._validated(value, inner)
+
+
+@dataclass(frozen=True)
 class OneOrEach:
     """A number for all of a set, or a list with one for each."""
 

@@ -21,9 +21,12 @@ KINDS = {
     "specific_force": "mjspace.sensors.accelerometer:Accelerometer",
     "magnetic_field": "mjspace.sensors.magnetometer:Magnetometer",
     "field_reference": "mjspace.sensors.field_reference:FieldReference",
-    "sun_direction": "mjspace.sensors.sun_sensor:SunSensor",
     "sun_reference": "mjspace.sensors.sun_reference:SunReference",
     "nadir": "mjspace.sensors.horizon:HorizonSensor",
+    "sun_direction": "mjspace.sensors.sun_sensor:SunSensor",
+    "sun_cosines": "mjspace.sensors.sun_sensor:CoarseSunSensor",
+    "gnss_position": "mjspace.sensors.gnss:GnssPosition",
+    "gnss_velocity": "mjspace.sensors.gnss:GnssVelocity",
     "model": "mjspace.sensors.model_sensor:OfModel",
 }
 """The sensor of each quantity, "module:Class": the class is imported when a scenario is read. Those

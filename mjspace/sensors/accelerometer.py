@@ -7,10 +7,11 @@ import numpy as np
 from mjspace import attitude
 from mjspace.contract import Array, Measurement
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Sensor, State, Surroundings
+from mjspace.sensors.base import State, Surroundings
+from mjspace.sensors.linear import Triad
 
 
-class Accelerometer(Sensor[Annotated[NonNegative, Si("m/s^2")]]):
+class Accelerometer(Triad[Annotated[NonNegative, Si("m/s^2")]]):
     """Accelerometers at the bus's origin: the mean specific force since the last sample, body axes.
 
     The change of velocity less gravity's share, over the period, in the axes halfway: what pulse

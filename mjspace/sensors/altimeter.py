@@ -4,10 +4,11 @@ from typing import Annotated, ClassVar, Literal
 
 from mjspace.contract import Array
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Motion, Sensor
+from mjspace.sensors.base import Motion
+from mjspace.sensors.linear import Linear
 
 
-class Altimeter(Sensor[Annotated[NonNegative, Si("m")]]):
+class Altimeter(Linear[Annotated[NonNegative, Si("m")]]):
     """Altimeter: the height of the bus above the plane z = 0."""
 
     measures: Literal["altitude"] = "altitude"

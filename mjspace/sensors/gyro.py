@@ -3,10 +3,10 @@
 from typing import Annotated, ClassVar, Literal
 
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Sensor
+from mjspace.sensors.linear import Triad
 
 
-class Gyro(Sensor[Annotated[NonNegative, Si("rad/s")]]):
+class Gyro(Triad[Annotated[NonNegative, Si("rad/s")]]):
     """Gyro: the bus's angular velocity relative to inertial, body axes."""
 
     measures: Literal["rate"] = "rate"

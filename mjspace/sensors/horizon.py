@@ -10,6 +10,7 @@ from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import NonNegative, Positive, Si, Unit3
+from mjspace.sensors import sky
 from mjspace.sensors.base import Motion, Sensor
 
 
@@ -18,7 +19,8 @@ class HorizonSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
 
     It bisects the infrared limb of a spherical Earth (Wertz, ed., Spacecraft Attitude Determination
     and Control, 1978, section 6.2). Its errors are small rotations of that vector about the body
-    axes. It reports zeros while the Earth's centre is outside of its field of view.
+    axes. It reports zeros, which are not valid, while the Earth's centre
+    is outside of its field of view.
     """
 
     measures: Literal["nadir"] = "nadir"
@@ -29,11 +31,17 @@ class HorizonSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
     field_of_view: Annotated[Positive, Field(le=pi), Si("rad")] = pi
     """Largest angle between the boresight and the Earth's centre; all directions when left out."""
     unit: ClassVar[str] = ""
+    holds: ClassVar[bool] = False
 
     @property
     def errs(self) -> bool:
         """Whether a sample may differ from the true direction."""
-        return super().errs or self.field_of_view < pi
+        return super().errs or not self.sees_always
+
+    @property
+    def sees_always(self) -> bool:
+        """Whether it looks in all directions."""
+        return self.field_of_view == pi
 
     def check_environment(self, environment: Environment) -> None:
         """Refuse a flight that is not in an orbit round the Earth."""
@@ -42,11 +50,11 @@ class HorizonSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
 
     def true_value(self, motion: Motion) -> Array:
         """Return the unit vector to the Earth's centre, body axes, (..., 3)."""
-        orbit = motion.surroundings.orbit_position
-        assert orbit is not None
-        down = -(orbit(motion.time) + motion.position)
-        down /= np.linalg.norm(down, axis=-1, keepdims=True)
-        return attitude.rotate(attitude.conjugate(motion.attitude), down)
+        return sky.nadir(motion)
+
+    def sees(self, motion: Motion) -> Array:
+        """Return 1.0 where the Earth's centre is in view, else 0.0, (..., 1)."""
+        return self._in_view(sky.nadir(motion)).astype(float)
 
     def with_error(self, value: Array, error: Array) -> Array:
         """Return the vector turned by the rotation vector ``error`` [rad]; zeros out of view."""
@@ -54,6 +62,9 @@ class HorizonSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
         if self.quantization:
             turned = np.rint(turned / self.quantization)
             turned = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
-        axis = np.array(self.boresight) / np.linalg.norm(self.boresight)
-        in_view = np.sum(value * axis, axis=-1, keepdims=True) >= cos(self.field_of_view)
-        return np.where(in_view, turned, 0.0)
+        return np.where(self._in_view(value), turned, 0.0)
+
+    def _in_view(self, direction: Array) -> Array:
+        axis = sky.unit(self.boresight)
+        seen: Array = np.sum(direction * axis, axis=-1, keepdims=True) >= cos(self.field_of_view)
+        return seen

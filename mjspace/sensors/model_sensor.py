@@ -9,7 +9,7 @@ from mjspace.sensors.base import Sensor, Surroundings
 from mjspace.sensors.star_tracker import turned
 from mjspace.units import Quantity
 
-_ERRORS = ("noise_std", "bias_std", "bias_walk", "quantization")
+_ERRORS = ("noise_std", "bias", "bias_std", "bias_walk", "bias_instability", "quantization")
 
 
 class OfModel(Sensor[Annotated[NonNegative, AnyUnit]]):
@@ -30,6 +30,10 @@ class OfModel(Sensor[Annotated[NonNegative, AnyUnit]]):
         """Return the field of the truth that it samples."""
         return name if self.of is None else self.of
 
+    def alias(self, name: str) -> str:
+        """Return the field of the truth that it samples."""
+        return self.quantity(name)
+
     def axes_of(self, name: str, surroundings: Surroundings) -> int:
         """Return on how many axes the model's sensor errs.
 
@@ -41,13 +45,20 @@ class OfModel(Sensor[Annotated[NonNegative, AnyUnit]]):
             near = nearest(sampled, known)
             raise ValueError(f"sensors.{name}: the model has no sensor {sampled!r}{near}")
         own = known[sampled]
-        for key in _ERRORS:
-            value, right = getattr(self, key), "rad" if own.is_attitude else own.unit
-            if isinstance(value, Quantity) and value.unit != right:
-                given = f"{value:.6g} {value.unit}"
-                wanted = f"in {right}" if right else "a plain number"
-                raise ValueError(f"sensors.{name}.{key}: got {given}, should be {wanted}")
+        right = "rad" if own.is_attitude else own.unit
+        rights = dict.fromkeys(_ERRORS, right) | {"noise_density": f"{right}/sqrt(Hz)"}
+        for key, unit in rights.items():
+            value = getattr(self, key)
+            for each in value if isinstance(value, list) else [value]:
+                if isinstance(each, Quantity) and each.unit != unit:
+                    wanted = f"in {unit}" if right else "a plain number"
+                    given = f"{each:.6g} {each.unit}"
+                    raise ValueError(f"sensors.{name}.{key}: got {given}, should be {wanted}")
         return 3 if own.is_attitude else own.size
+
+    def width_of(self, name: str, surroundings: Surroundings) -> int:
+        """Return how many numbers the model's sensor reports."""
+        return surroundings.own_sensors[self.quantity(name)].size
 
     def with_error(self, value: Array, error: Array) -> Array:
         """Return what is reported of the true ``value`` under the ``error``, (..., axes)."""

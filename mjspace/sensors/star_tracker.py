@@ -1,27 +1,102 @@
 """Star trackers: the attitude, in error by a small rotation."""
 
-from math import cos, sin, sqrt
+from math import cos, pi, sin, sqrt
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mjspace.contract import Array
 from mjspace.gufunc import gufunc
-from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Sensor
+from mjspace.scenario.environment import Environment
+from mjspace.scenario.fields import NonNegative, Positive, Si, Unit3
+from mjspace.sensors import sky
+from mjspace.sensors.base import Motion, Sensor
+
+Exclusion = Annotated[Positive, Field(le=pi), Si("rad")]
 
 
 class StarTracker(Sensor[Annotated[NonNegative, Si("rad")]]):
-    """Star tracker: the attitude; its errors are small rotations about the body axes."""
+    """Star tracker: the attitude; its errors are small rotations about the body axes.
+
+    Blinded, or turning too fast, it reports its last attitude again, which is not valid:
+    ``measurement.<name>_valid``. One of several heads is several sensors.
+    """
 
     measures: Literal["attitude"] = "attitude"
     quantization: Annotated[NonNegative, Field(lt=1), Si("rad")] = 0.0
     """Size of the least significant digit: the components of the quaternion are rounded to half of
     it."""
+    boresight: Unit3 = Field(default=[0.0, 0.0, 1.0])
+    """Centre of the field of view, body axes; its length does not matter."""
+    roll_noise_std: Annotated[NonNegative, Si("rad")] | None = None
+    """``noise_std`` about the boresight, which is then that about the axes across; as those when
+    left out."""
+    sun_exclusion: Exclusion | None = None
+    """Least angle between the boresight and the Sun, where the Sun is visible."""
+    moon_exclusion: Exclusion | None = None
+    """Least angle between the boresight and the Moon, where the Earth does not hide it."""
+    earth_exclusion: Exclusion | None = None
+    """Least angle between the boresight and the limb of what is orbited."""
+    rate_limit: Annotated[Positive, Si("rad/s")] | None = None
+    """Fastest rotation at which it has an attitude."""
     unit: ClassVar[str] = ""
     width: ClassVar[int | None] = 4
     axes: ClassVar[int | None] = 3
+
+    @model_validator(mode="after")
+    def _rolls(self) -> "StarTracker":
+        if self.roll_noise_std is not None and not (self.noise_std and not self.noise_density):
+            raise ValueError("roll_noise_std: needs a noise_std, and no noise_density")
+        return self
+
+    @property
+    def sees_always(self) -> bool:
+        """Whether nothing blinds it."""
+        exclusions = self.sun_exclusion, self.moon_exclusion, self.earth_exclusion
+        return all(limit is None for limit in (*exclusions, self.rate_limit))
+
+    def check_environment(self, environment: Environment) -> None:
+        """Refuse exclusion angles to what is not known to be there."""
+        if self.earth_exclusion is not None and environment.orbit is None:
+            raise ValueError("earth_exclusion: needs an [environment.orbit]")
+        for body in ("sun", "moon"):
+            key = f"{body}_exclusion"
+            if getattr(self, key) is not None and not environment.has_sun:
+                raise ValueError(
+                    f"{key}: needs an environment.epoch and an [environment.orbit] with body = "
+                    '"earth"'
+                )
+
+    def sees(self, motion: Motion) -> Array:
+        """Return 1.0 where nothing blinds it and it turns slowly enough, else 0.0, (..., 1)."""
+        axis, seen = sky.unit(self.boresight), np.ones((*motion.rate.shape[:-1], 1))
+        if self.rate_limit is not None:
+            square = np.sum(motion.rate**2, axis=-1, keepdims=True)
+            seen = np.where(square <= self.rate_limit**2, seen, 0.0)
+        if self.earth_exclusion is not None:
+            off = sky.from_axis(sky.nadir(motion), axis) - sky.limb(motion)
+            seen = np.where(off >= self.earth_exclusion, seen, 0.0)
+        if self.sun_exclusion is not None:
+            off = sky.from_axis(sky.sun_direction(motion), axis)
+            dazzled = (off < self.sun_exclusion) & (sky.sunlight(motion) > 0.0)
+            seen = np.where(dazzled, 0.0, seen)
+        if self.moon_exclusion is not None:
+            moon = sky.moon_direction(motion)
+            near = sky.from_axis(moon, axis) < self.moon_exclusion
+            away = np.sum(moon * sky.nadir(motion), axis=-1, keepdims=True)
+            hidden = away > np.cos(sky.limb(motion))  # behind the Earth, which is nearer
+            seen = np.where(near & ~hidden, 0.0, seen)
+        return seen
+
+    def weighted(self, white: Array) -> Array:
+        """Return the numbers with those about the boresight in the ratio of the noises."""
+        if self.roll_noise_std is None:
+            return white
+        axis, across = sky.unit(self.boresight), float(self.noise_std)
+        about = np.sum(white * axis, axis=-1, keepdims=True) * axis
+        weighted: Array = white + (self.roll_noise_std / across - 1.0) * about
+        return weighted
 
     def with_error(self, value: Array, error: Array) -> Array:
         """Return the attitude turned by the rotation vector ``error`` [rad], then rounded.

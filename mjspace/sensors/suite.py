@@ -2,20 +2,28 @@
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import sqrt
+from dataclasses import replace
+from math import ceil, sqrt
 from typing import Any
 
 import numpy as np
 
 from mjspace.contract import REPORTED_BY_PLANT, Array, Measurement
+from mjspace.scenario.fields import of_each, refuse_other_count
 from mjspace.scenario.plant import Rates
-from mjspace.sensors.base import Sensor, State, Surroundings
+from mjspace.sensors.base import Sensor, State, Surroundings, in_unit
+from mjspace.sensors.fault_kinds import KINDS, STREAM, SensorFault, of_sensor
 from mjspace.sensors.noise import normals, stream_of
-from mjspace.units import whole_number
+from mjspace.sensors.sampled import Fault, Sampled
+from mjspace.units import Quantity, whole_number
 
+_PER_SECOND = {"rad": "rad/s", "rad/s": "rad/s^2", "m": "m/s", "m/s": "m/s^2"}
 MOST_SAMPLES = 10000
 """That a delay keeps."""
+# Streams of a sensor, after that of its name. A number stands in no log, but a flight is flown
+# again with the same.
+_STREAMS = ("bias", "white", "increment", "scale_factor", "misalignment", "non_orthogonality")
+_STREAM = {name: number for number, name in enumerate((*_STREAMS, "markov"))}
 
 
 class SensorSuite:
@@ -25,11 +33,14 @@ class SensorSuite:
     least ``delay`` old, and its first until there is one. An ideal sensor has no state and reports
     the truth's own array, which is no copy. Each other one has ``<name>_samples`` (N, delay + 1,
     width), its last reports, the oldest first; each whose bias walks also has ``<name>_walk``
-    (N, axes), the walk at the next sample.
+    (N, axes), the walk at the next sample, and ``<name>_markov`` likewise. The samples of one that
+    may be invalid have a last column, 1.0 where they are valid, which is reported as
+    ``<name>_valid``, (N, 1).
 
     Attributes:
-        ticks: the sampling periods of the sensors that are not ideal, in integration steps;
-            ``sample`` is to be called at every multiple of each.
+        ticks: of the sensors that are not ideal, the sampling periods, or what they and the
+            arrivals of late samples are multiples of, in integration steps; ``sample`` is to be
+            called at every multiple of each.
         measurement: the class of what ``sample`` returns, which knows each quantity's sensor.
     """
 
@@ -40,62 +51,59 @@ class SensorSuite:
         seed: int,
         members: Sequence[int],
         surroundings: Surroundings,
+        faults: Sequence[SensorFault] = (),
+        *,
+        inner: bool = False,
     ) -> None:
-        """Draw the constant biases of ``members``, the vehicles' numbers in the campaign ``seed``.
+        """Draw the constant errors of ``members``, the vehicles' numbers in the campaign ``seed``.
 
-        A member measures the same alone or in any batch, whatever other sensors it has.
+        A member measures the same alone or in any batch, whatever other sensors it has. ``faults``
+        are those of the scenario; ``inner`` is whether an inner loop measures between control
+        instants.
 
         Raises:
-            ValueError: a period is no whole number of integration steps, or a delay no whole number
-                of periods.
+            ValueError: a period or a delay is no whole number of integration steps, or a known
+                error or a fault does not fit its sensor.
         """
         self._surroundings, self._steps = surroundings, rates.steps
         self.measurement = Measurement._with_sensors(
-            {name: table.quantity(name) for name, table in sensors.items()}
+            {name: table.alias(name) for name, table in sensors.items()}
         )
         every = [
-            _sampled(name, table, rates, seed, members, surroundings)
+            _sampled(name, table, rates, seed, members, surroundings, faults, inner=inner)
             for name, table in sensors.items()
         ]
         self._sampled = [sensor for sensor in every if sensor is not None]
         own = {sensor.name for sensor in self._sampled}
         self._ideal = {n: table.quantity(n) for n, table in sensors.items() if n not in own}
         self._reported = [name for name in REPORTED_BY_PLANT if name != "wheel_speed"]
-        sampled = {table.quantity(name) for name, table in sensors.items()}
-        self._reported += [name for name in surroundings.own_sensors if name not in sampled]
+        measured = {table.quantity(name) for name, table in sensors.items()}
+        self._reported += [name for name in surroundings.own_sensors if name not in measured]
         # The fields of a truth that is reported as it is, without a copy.
         same = not self._sampled and all(name == q for name, q in self._ideal.items())
         self._as_it_is = {*self._ideal, *self._reported} if same else set()
-        self.ticks = frozenset(sensor.period for sensor in self._sampled)
+        self.ticks = frozenset(sensor.tick for sensor in self._sampled)
 
     def reset(self, truth: Measurement) -> State:
         """Return the state before the first sample, at step 0, where the truth is ``truth``."""
         state: State = {}
         for sensor in self._sampled:
-            table = sensor.table
-            if table.integrates:
-                value = table.begin(state, sensor.name, truth)
-            else:
-                value = getattr(truth, sensor.quantity)
-            if table.bias_walk:
-                state[sensor.walk_field] = np.zeros_like(sensor.bias)
-            first = sensor.read(state, 0, value)
-            state[sensor.samples_field] = np.repeat(first[:, None], sensor.delay + 1, axis=1)
+            sensor.begin(state, truth)
         return state
 
     def sample(
-        self, state: State, step_index: int, truth: Measurement
+        self, state: State, step_index: int, truth: Measurement, phase: Array | None = None
     ) -> tuple[State, Measurement]:
         """Return (state, measurement) at integration step ``step_index``.
 
         ``truth`` has a vehicle axis and each quantity by its name: attitude (N, 4), rate (N, 3).
-        ``state`` is left as it is, so that this step may be sampled from it again.
+        ``phase`` (N, faults) is that of the scenario's faults, where there are any. ``state`` is
+        left as it is, so that this step may be sampled from it again.
         """
         if self._sampled:
             state = state.copy()
             for sensor in self._sampled:
-                if step_index % sensor.period == 0:
-                    self._take(sensor, state, step_index, truth)
+                sensor.take(state, step_index, truth, phase, self._surroundings)
         return state, self.report(state, truth)
 
     def report(self, state: State, truth: Measurement) -> Measurement:
@@ -105,15 +113,22 @@ class SensorSuite:
             return truth
         reports = {name: arrays[quantity] for name, quantity in self._ideal.items()}
         for sensor in self._sampled:
-            reports[sensor.name] = state[sensor.samples_field][:, 0]
+            report = state[sensor.report_field][:, 0]
+            reports[sensor.name] = report[:, :-1] if sensor.flagged else report
+            if sensor.flagged:
+                reports[f"{sensor.name}_valid"] = report[:, -1:]
         for name in self._reported:
             reports[name] = arrays[name]
         return self.measurement(**reports)
 
     @property
-    def biases(self) -> dict[str, Array]:
-        """The constant bias of each sensor that is not ideal, (N, axes)."""
-        return {sensor.name: sensor.bias for sensor in self._sampled}
+    def constants(self) -> dict[str, Array]:
+        """What is constant of the errors of each sensor that is not ideal, (N, ...), by name."""
+        return {
+            f"{sensor.name}_{what}": array
+            for sensor in self._sampled
+            for what, array in sensor.fixed.items()
+        }
 
     def draws(self, periods: Sequence[int]) -> dict[str, Array]:
         """Return what a sample at each of these control instants takes, by sensor and purpose.
@@ -124,20 +139,19 @@ class SensorSuite:
         drawn = {}
         for sensor in self._sampled:
             steps = [number * self._steps for number in periods]
-            samples = [step // sensor.period for step in steps]
-            if sensor.table.noise_std:
-                drawn[f"{sensor.name}_white"] = np.array([sensor.white(i) for i in samples])
-            if sensor.table.bias_walk:
-                drawn[f"{sensor.name}_increment"] = np.array([sensor.increment(i) for i in samples])
+            for purpose, ahead in sensor.drawn.items():
+                numbers = [sensor.draws[purpose](step // sensor.period + ahead) for step in steps]
+                drawn[f"{sensor.name}_{purpose}"] = np.array(numbers)
             if sensor.period != self._steps:
-                due = [float(step % sensor.period == 0) for step in steps]
-                drawn[f"{sensor.name}_due"] = np.array(due).reshape(-1, 1, 1)
+                for mark, phase in sensor.phases.items():
+                    at = [float(step % sensor.period == phase) for step in steps]
+                    drawn[f"{sensor.name}_{mark}"] = np.array(at).reshape(-1, 1, 1)
         return drawn
 
-    def with_errors(self, biases: Mapping[str, Any], draws: Mapping[str, Any]) -> "SensorSuite":
-        """Return sensors with these biases, and these draws in whichever sample.
+    def with_errors(self, constants: Mapping[str, Any], draws: Mapping[str, Any]) -> "SensorSuite":
+        """Return sensors with these constants, and these draws in whichever sample.
 
-        Both are as ``biases`` and, of one control instant, as ``draws`` return them; or they are
+        Both are as ``constants`` and, of one control instant, as ``draws`` return them; or they are
         traced.
         """
 
@@ -148,75 +162,29 @@ class SensorSuite:
         other._sampled = [
             replace(
                 sensor,
-                bias=biases[sensor.name],
-                white=whichever(f"{sensor.name}_white"),
-                increment=whichever(f"{sensor.name}_increment"),
-                due=draws.get(f"{sensor.name}_due"),
+                fixed={what: constants[f"{sensor.name}_{what}"] for what in sensor.fixed},
+                draws={p: whichever(f"{sensor.name}_{p}") for p in sensor.draws},
+                marks={
+                    mark: draws[f"{sensor.name}_{mark}"]
+                    for mark in sensor.phases
+                    if f"{sensor.name}_{mark}" in draws
+                },
             )
             for sensor in self._sampled
         ]
         return other
 
-    def sample_where_due(self, state: State, truth: Measurement) -> tuple[State, Measurement]:
+    def sample_where_due(
+        self, state: State, truth: Measurement, phase: Array | None = None
+    ) -> tuple[State, Measurement]:
         """Return (state, measurement) of sensors ``with_errors``, at any control instant but 0.
 
         Each takes a sample; one that is not due keeps what it held.
         """
         after = state.copy()
         for sensor in self._sampled:
-            before = after.copy()
-            self._take(sensor, after, sensor.period, truth)
-            if sensor.due is None:
-                continue
-            for name, held in before.items():
-                if after[name] is not held:
-                    after[name] = np.where(sensor.due > 0.5, after[name], held)
+            sensor.take_where_due(after, truth, phase, self._surroundings)
         return after, self.report(after, truth)
-
-    def _take(self, sensor: "_Sampled", state: State, step_index: int, truth: Measurement) -> None:
-        """Put the sample of this step, and the walk that follows it, into ``state``."""
-        table, index = sensor.table, step_index // sensor.period
-        if not table.integrates:
-            value = getattr(truth, sensor.quantity)
-        elif index == 0:
-            value = table.begin(state, sensor.name, truth)
-        else:
-            value = table.mean(state, sensor.name, truth, sensor.span, self._surroundings)
-        new = sensor.read(state, index, value)[:, None]
-        if sensor.delay:
-            new = np.concatenate([state[sensor.samples_field][:, 1:], new], axis=1)
-        state[sensor.samples_field] = new
-        if table.bias_walk:
-            walk = sensor.walk * sensor.increment(index)
-            state[sensor.walk_field] = state[sensor.walk_field] + walk
-
-
-@dataclass(frozen=True)
-class _Sampled:
-    """A sensor that is not ideal, with the random streams of each vehicle's."""
-
-    name: str
-    table: Sensor[Any]
-    quantity: str  # the field of the truth that it samples
-    period: int  # integration steps
-    span: float  # of a period [s]
-    delay: int  # samples
-    bias: Array  # (N, axes)
-    white: Callable[[int], Array]
-    walk: float  # standard deviation of one period's increment
-    increment: Callable[[int], Array]
-    samples_field: str
-    walk_field: str
-    due: Any = None  # 1.0 or 0.0, (1, 1), for ``sample_where_due``; None: always
-
-    def read(self, state: State, index: int, truth: Array) -> Array:
-        """Return what sample ``index`` reports of the ``truth``."""
-        error = self.bias
-        if self.table.noise_std:
-            error = error + self.table.noise_std * self.white(index)
-        if self.table.bias_walk:
-            error = error + state[self.walk_field]
-        return self.table.with_error(truth, error)
 
 
 def _sampled(
@@ -226,40 +194,96 @@ def _sampled(
     seed: int,
     members: Sequence[int],
     surroundings: Surroundings,
-) -> _Sampled | None:
-    """Return the sensor, or None when at every control instant it reports the truth itself."""
+    faults: Sequence[SensorFault],
+    *,
+    inner: bool,
+) -> Sampled | None:
+    """Return the sensor, or None when at every control instant it reports the truth itself.
+
+    Where nothing looks between control instants, as an ``inner`` loop does, a report arrives at the
+    first of them at which it is old enough.
+
+    Raises:
+        ValueError: a period or delay is no whole number of integration steps, or a known error or a
+            fault does not fit.
+    """
     axes = table.axes_of(name, surroundings)
     if name in surroundings.own_sensors and table.quantity(name) != name:
         raise ValueError(
             f'sensors.{name}: the model has a sensor of that name: measures = "model" gives it '
             "errors; else call this one otherwise"
         )
-    period_key = "rates.control" if table.period is None else f"sensors.{name}.period"
     seconds = rates.control if table.period is None else table.period
+    period_key = "rates.control" if table.period is None else f"sensors.{name}.period"
     period = whole_number(seconds, rates.physics, period_key, "rates.physics")
     if table.at_control and period % rates.steps:
         whole_number(seconds, rates.control, f"sensors.{name}.period", "rates.control")
-    if not (table.errs or table.integrates or table.delay or rates.steps % period):
+    own = of_sensor(name, faults)
+    sees_all = table.sees_always and not own
+    if sees_all and not (table.errs or table.integrates or table.delay or rates.steps % period):
         return None
-    delay = table.delay and whole_number(table.delay, seconds, f"sensors.{name}.delay", period_key)
+    steps = table.delay and whole_number(
+        table.delay, rates.physics, f"sensors.{name}.delay", "rates.physics"
+    )
+    if not inner and period % rates.steps == 0:
+        steps = rates.steps * ceil(steps / rates.steps)
+    delay, arrival = divmod(int(steps), period)
     if delay > MOST_SAMPLES:
         raise ValueError(
             f"sensors.{name}.delay: {table.delay:g} s is {delay:g} times {period_key}: at most "
             f"{MOST_SAMPLES}, as each sample is kept and logged"
         )
     stream = stream_of(name)
-    constant, white, increment = (normals(seed, members, (stream, part), axes) for part in range(3))
-    return _Sampled(
+
+    def numbers(purpose: str, width: int) -> Callable[[int], Array]:
+        return normals(seed, members, (stream, _STREAM[purpose]), width)
+
+    draws = {purpose: numbers(purpose, axes) for purpose in ("white", "increment", "markov")}
+    draws |= {f"lost_{number}": normals(seed, members, (STREAM + number,), 1) for number, _ in own}
+    width = table.width_of(name, surroundings)
+    nothing = np.zeros(width)
+    nothing[:1] = float(width == 4 and axes == 3)  # of a quaternion
+    return Sampled(
         name=name,
         table=table,
         quantity=table.quantity(name),
         period=period,
         span=period * rates.physics,
-        delay=int(delay),
-        bias=table.bias_std * constant(0),
-        white=white,
+        delay=delay,
+        arrival=arrival,
+        fixed=table.fixed(lambda purpose, count: numbers(purpose, count)(0), name, axes),
+        draws=draws,
+        noise=table.noise(seconds),
         walk=table.bias_walk * sqrt(seconds),
-        increment=increment,
-        samples_field=f"{name}_samples",
-        walk_field=f"{name}_walk",
+        markov=table.markov(seconds),
+        nothing=nothing,
+        faults=[_fault(number, each, table, axes, seconds) for number, each in own],
     )
+
+
+def _fault(number: int, fault: SensorFault, table: Sensor[Any], axes: int, period: float) -> Fault:
+    """Return the fault of a sensor with that ``period`` [s].
+
+    Raises:
+        ValueError: its value does not fit the sensor.
+    """
+    key, kind, value = f"faults.{number}.value", KINDS[fault.kind], fault.value
+    if kind.gain(2.0) != 1.0 and not table.noise(period):
+        raise ValueError(f"{key}: the sensor has no white noise")
+    unit = in_unit(table)
+    right = "s" if kind.in_seconds else ""
+    if kind.of_axes and unit is not None:
+        right = _PER_SECOND.get(unit, "") if kind.per_second else unit
+    for each in value if isinstance(value, list) else [value]:
+        if (
+            isinstance(each, Quantity)
+            and each.unit != right
+            and not (kind.of_axes and unit is None)
+        ):
+            wanted = f"in {right}" if right else "a plain number"
+            raise ValueError(f"{key}: got {each:.6g} {each.unit}, should be {wanted}")
+    if kind.of_axes:
+        refuse_other_count(key, value, axes, "axes")
+        return Fault(number, kind, of_each(value, axes))
+    late = kind.late(value or 0.0, period, key)
+    return Fault(number, kind, value, late)

@@ -8,7 +8,9 @@ from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import NonNegative, Si
+from mjspace.sensors import sky
 from mjspace.sensors.base import Motion, Sensor
+from mjspace.sensors.sun_sensor import refuse_without_sun
 
 
 class SunReference(Sensor[Annotated[NonNegative, Si("rad")]]):
@@ -21,27 +23,14 @@ class SunReference(Sensor[Annotated[NonNegative, Si("rad")]]):
     unit: ClassVar[str] = ""
 
     def check_environment(self, environment: Environment) -> None:
-        """Refuse an environment in which nobody knows where the Sun is."""
-        if not environment.has_sun:
-            raise ValueError('needs environment.epoch and an [environment.orbit], body = "earth"')
+        """Refuse a flight in which it is not known where the Sun is."""
+        refuse_without_sun(environment)
 
     def true_value(self, motion: Motion) -> Array:
         """Return the unit vector to the Sun, inertial axes, (..., 3)."""
-        return to_sun(motion)[1]
+        return sky.to_sun(motion)
 
     def with_error(self, value: Array, error: Array) -> Array:
         """Return the vector turned by the rotation vector ``error`` [rad], then rounded."""
         turned = attitude.rotate(attitude.from_rotation_vector(error), value)
         return super().with_error(turned, np.zeros_like(error))
-
-
-def to_sun(motion: Motion) -> tuple[Array, Array]:
-    """Return the bus's place from the Earth's centre [m] and the unit vector to the Sun, inertial.
-
-    Both (..., 3); the second without the 0.0057 deg of aberration.
-    """
-    around = motion.surroundings
-    assert around.orbit_position is not None
-    assert around.sun_position is not None
-    place = around.orbit_position(motion.time) + motion.position
-    return place, attitude.normalize(around.sun_position(motion.time) - place)

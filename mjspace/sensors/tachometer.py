@@ -3,10 +3,10 @@
 from typing import Annotated, ClassVar, Literal
 
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Sensor
+from mjspace.sensors.linear import Linear
 
 
-class Tachometer(Sensor[Annotated[NonNegative, Si("rad/s")]]):
+class Tachometer(Linear[Annotated[NonNegative, Si("rad/s")]]):
     """Tachometers: the speed of each wheel relative to what carries it."""
 
     measures: Literal["wheel_speed"] = "wheel_speed"

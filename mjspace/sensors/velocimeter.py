@@ -5,10 +5,11 @@ from typing import Annotated, ClassVar, Literal
 from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.scenario.fields import NonNegative, Si
-from mjspace.sensors.base import Motion, Sensor
+from mjspace.sensors.base import Motion
+from mjspace.sensors.linear import Triad
 
 
-class Velocimeter(Sensor[Annotated[NonNegative, Si("m/s")]]):
+class Velocimeter(Triad[Annotated[NonNegative, Si("m/s")]]):
     """Velocimeter: the velocity of the bus, body axes."""
 
     measures: Literal["ground_velocity"] = "ground_velocity"

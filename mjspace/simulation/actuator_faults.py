@@ -1,10 +1,10 @@
-"""Faults of actuators as a step effect: what the actuators apply is changed on its way."""
+"""Faults as a step effect: when they begin and end, and what motors apply under them."""
 
 from collections.abc import Sequence
 from typing import ClassVar, Self
 
 from mjspace.actuators.faults import FaultSet
-from mjspace.contract import Array
+from mjspace.contract import Array, Event
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.joined import topics_of
 from mjspace.vehicle.step_effect import Instant, State, StepEffect, Topics
@@ -31,6 +31,13 @@ class ActuatorFaults(StepEffect):
     def reset(self, physics: Array) -> State:
         """Return the faults' state at the start, ``FaultSet.reset``."""
         return self._faults.reset()
+
+    def observe(self, memory: State, physics: Array, time: float, events: list[Event]) -> State:
+        """Begin and end sensors' faults by the time, before the sensors sample."""
+        if self._faults.of_sensors:
+            memory, happened = self._faults.decide_for_sensors(memory, time)
+            events.extend(happened)
+        return memory
 
     def at_control(self, memory: State, instant: Instant) -> State:
         """Begin and end what is due, by the time or by a signal of this instant."""

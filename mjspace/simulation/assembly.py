@@ -13,9 +13,12 @@ from mjspace.actuators.actuator_set import ActuatorSet
 from mjspace.actuators.base import Context
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array, Law, ReferenceSource
+from mjspace.environment.constants import RADIUS
 from mjspace.environment.ephemeris import KnownEphemeris
 from mjspace.environment.install import userdata, userdata_size
-from mjspace.environment.orbit import orbit_position
+from mjspace.environment.orbit import orbit_position, orbit_velocity
+from mjspace.environment.shadow import visible_from
+from mjspace.environment.solar_pressure import shadow_radii
 from mjspace.errors import InputError, input_error_at
 from mjspace.scenario.construct import construct
 from mjspace.scenario.scenario import Component, Scenario
@@ -23,7 +26,7 @@ from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
-from mjspace.simulation.estimated_law import EstimatedLaw
+from mjspace.simulation.estimated_law import EstimatedLaw, refuse_inner_loop
 from mjspace.simulation.known_beforehand import Known, known_of, seen_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
@@ -76,12 +79,16 @@ class Assembly:
             scenario.seed,
             members,
             self.surroundings,
+            scenario.faults,
+            inner=self.inner,
         )
 
     @property
     def surroundings(self) -> Surroundings:
         """What the sensors need to know of the vehicle and of where it flies."""
-        orbit = self.scenario.environment.orbit
+        environment = self.scenario.environment
+        orbit = environment.orbit
+        radii = shadow_radii(environment)
         return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
             own_sensors={
@@ -90,6 +97,9 @@ class Assembly:
             | {f"{n}_closed": OwnSensor(1, "", False) for n in self.scenario.plant.connections},
             gravity=self._gravity,
             orbit_position=None if orbit is None else partial(orbit_position, orbit),
+            orbit_velocity=None if orbit is None else partial(orbit_velocity, orbit),
+            planet_radius=0.0 if orbit is None else RADIUS[orbit.body],
+            sunlight=lambda place, sun: visible_from(place, sun, *radii),
             **{name: one.at for name, one in seen_of(self.known).items()},
         )
 
@@ -114,8 +124,15 @@ class Assembly:
         scenario = self.scenario
         if not scenario.faults:
             return None
-        kinds = self.actuators.kinds
-        return FaultSet(scenario.faults, kinds, self.hold, scenario.seed, members)
+        return FaultSet(
+            scenario.faults,
+            self.actuators.kinds,
+            self.hold,
+            scenario.seed,
+            members,
+            scenario.rates.control,
+            list(scenario.sensors),
+        )
 
     def _gravity(self, position: Array) -> Array:
         """Return the central gravity [m/s^2] at ``position`` [m], both (..., 3)."""
@@ -176,12 +193,7 @@ def assemble(
     _part("reference", reference.at, np.array([0.0, scenario.duration]))
     inner = _part("law", _has_inner_loop, law)
     if scenario.estimator is not None:
-        if inner:
-            raise InputError(
-                f"estimator: the inner loop of {scenario.law.kind} sees the sensors in every "
-                "integration step, where nothing is estimated: leave out [estimator], or name a "
-                "law without an inner loop"
-            )
+        _part("estimator", refuse_inner_loop, law)
         estimator, flown["estimator"] = _component(
             "estimator", scenario.estimator, facts, own, sources
         )
@@ -218,8 +230,8 @@ def assemble(
         disturbance=disturbance,
         sources=sources,
     )
-    _part("sensors", assembly.sensors, [0])
     _part("faults", assembly.faults, [0])
+    _part("sensors", assembly.sensors, [0])
     return assembly
 
 

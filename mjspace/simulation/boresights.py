@@ -4,38 +4,25 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mjspace import attitude
 from mjspace.contract import Array
-from mjspace.environment.constants import RADIUS
 from mjspace.scenario.boresight import Boresight
-from mjspace.scenario.environment import Environment
+from mjspace.sensors import sky
 from mjspace.sensors.base import Motion
 
 
 def angles_at(
-    motion: Motion,
-    seen: Mapping[str, Array],
-    boresights: Mapping[str, Boresight],
-    environment: Environment,
+    motion: Motion, seen: Mapping[str, Array], boresights: Mapping[str, Boresight]
 ) -> dict[str, Array]:
     """Return the angles [rad] of each boresight at ``motion``, (..., 1), by their fields of /truth.
 
     ``seen`` has the directions of Sun and Moon in body axes, (..., 3), by their fields of /truth,
     as far as they are known. The planet's disc is that of a sphere of its equatorial radius.
     """
-    if not boresights:
-        return {}
-    around = motion.surroundings
-    assert around.orbit_position is not None  # the scenario's validation has seen to it
-    place = around.orbit_position(motion.time) + motion.position
-    nadir = -attitude.rotate(attitude.conjugate(motion.attitude), place)
-    distance = np.sqrt(np.sum(place**2, axis=-1, keepdims=True))
-    disc = np.arcsin(np.minimum(RADIUS[environment.orbit.body] / distance, 1.0))
     found: dict[str, Array] = {}
     for name, boresight in boresights.items():
-        axis = attitude.normalize(np.array(boresight.axis))
-        off = _angle(nadir, axis)
-        found |= {f"{name}_nadir_angle": off, f"{name}_limb_angle": off - disc}
+        axis = sky.unit(boresight.axis)
+        off = _angle(sky.nadir(motion), axis)
+        found |= {f"{name}_nadir_angle": off, f"{name}_limb_angle": off - sky.limb(motion)}
         for body in ("sun", "moon"):
             if f"{body}_direction" in seen:
                 found[f"{name}_{body}_angle"] = _angle(seen[f"{body}_direction"], axis)
@@ -43,7 +30,10 @@ def angles_at(
 
 
 def _angle(vector: Array, axis: Array) -> Array:
-    """Return the angle [rad] between ``vector`` (..., 3) and ``axis`` (3,), (..., 1)."""
+    """Return the angle [rad] between ``vector`` (..., 3) and ``axis`` (3,), (..., 1).
+
+    Exact for small angles too, where a cosine tells nothing.
+    """
     normal = np.cross(vector, axis)
     sine = np.sqrt(np.sum(normal**2, axis=-1, keepdims=True))
     angle: Array = np.arctan2(sine, np.sum(vector * axis, axis=-1, keepdims=True))

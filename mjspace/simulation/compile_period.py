@@ -14,11 +14,12 @@ import numpy as np
 from mjspace.contract import DesiredMotion
 from mjspace.errors import FlightError, place_of
 from mjspace.interrupts import Interrupted
+from mjspace.sensors.fault_kinds import PHASE
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.hidden_memory import refusing_hidden_memory
 from mjspace.simulation.joined import topics_of
-from mjspace.simulation.period_program import PeriodProgram, Recorded, Section
+from mjspace.simulation.period_program import PeriodProgram, Recorded, Section, recorded_of
 from mjspace.simulation.state_layout import StateLayout
 from mjspace.simulation.traced_arrays import TracedArrays, changes, tuple_like
 from mjspace.simulation.truth import truth_of
@@ -82,10 +83,10 @@ class _Tracing(TracedArrays):
         self.law_state = tuple_like(example.law, map(self.held_of_one, example.law))
         self.sensors = self._held_arrays(example.sensors)
         suite = assembly.sensors([0])
-        self.biases = self._held_arrays(suite.biases)
+        self.constants = self._held_arrays(suite.constants)
         self.draws = self._held_arrays({name: a[0] for name, a in suite.draws([1]).items()})
         self.suite = suite.with_errors(
-            self.traced_arrays(self.biases), self.traced_arrays(self.draws)
+            self.traced_arrays(self.constants), self.traced_arrays(self.draws)
         )
         law = assembly.law
         self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
@@ -110,11 +111,11 @@ class _Tracing(TracedArrays):
         changed = changes(self.law_state, state) + changes(before, after)
         for target, source in changed:
             target[...] = source
-        recorded = [*_recorded("law", self.law_state), *_recorded("signals", signals)]
+        recorded = [*recorded_of("law", self.law_state), *recorded_of("signals", signals)]
         return self._compiled(
             command,
             sensing=Section(sensing[0], changed, alarms),
-            recorded=[*recorded, *_recorded("command", command), *reports],
+            recorded=[*recorded, *recorded_of("command", command), *reports],
             kinds={"law": type(self.law_state), "signals": type(signals)},
         )
 
@@ -188,7 +189,7 @@ class _Tracing(TracedArrays):
             memory=self.memory,
             law=self.law_state,
             sensors=self.sensors,
-            biases=self.biases,
+            constants=self.constants,
             draws=self.draws,
             known=self.known,
             command=command,
@@ -299,7 +300,8 @@ class _Tracing(TracedArrays):
     def _sample(self) -> tuple[Any, Any]:
         """Return what the sensors remember after a sample, and the measurement."""
         sensors = self.traced_arrays(self.sensors)
-        sampled, measurement = self.suite.sample_where_due(sensors, self._truth())
+        phase = self.traced_arrays(self.memory).get(PHASE)
+        sampled, measurement = self.suite.sample_where_due(sensors, self._truth(), phase)
         before = tuple(self.sensors.values())
         return self.following(before, tuple(sampled[name] for name in self.sensors)), measurement
 
@@ -343,9 +345,3 @@ def _of_the_law() -> Iterator[None]:
         raise
     except BaseException as error:
         raise Untraceable(f"{error} ({place_of(error)})") from error
-
-
-def _recorded(group: str, arrays: Any) -> list[Recorded]:
-    """Return the fields of a named tuple, which may be empty."""
-    names = getattr(arrays, "_fields", ())
-    return [Recorded(group, name, array) for name, array in zip(names, arrays, strict=True)]

@@ -55,17 +55,17 @@ class CompiledFlight:
         self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model, own)
         self._suite = assembly.sensors(members)
         self.physics = self._batch.state
-        named = (period.memory, period.sensors, period.biases)
+        named = (period.memory, period.sensors, period.constants)
         remembered = [*(a for arrays in named for a in arrays.values()), *period.law]
         places, size = _packed(remembered)
         self._rows = np.zeros((vehicles, size), np.uint8)
         views = [_view(self._rows, at, each) for at, each in zip(places, remembered, strict=True)]
         one_by_one = iter(views)
-        self.memory, self.sensors, biases = (
+        self.memory, self.sensors, constants = (
             {name: next(one_by_one) for name in arrays} for arrays in named
         )
-        for name, bias in self._suite.biases.items():
-            biases[name][...] = bias
+        for name, values in self._suite.constants.items():
+            constants[name][...] = values
         law = [next(one_by_one) for _ in period.law]
         self.law = type(period.law)(*law) if law else ()
         self._record_places, self._record_size = _packed(

@@ -16,6 +16,19 @@ from mjspace.simulation.user_code import (
 from mjspace.tracing.inner_loops import Untraceable
 
 
+def refuse_inner_loop(law: Law) -> None:
+    """Refuse a law that sees the sensors where nothing is estimated.
+
+    Raises:
+        ValueError: the law has an inner loop.
+    """
+    if hasattr(law, "inner"):
+        raise ValueError(
+            f"the inner loop of {type(law).__name__} sees the sensors in every integration step, "
+            "where nothing is estimated: leave out [estimator], or name a law without an inner loop"
+        )
+
+
 class EstimatedLaw:
     """A law whose measurement has what the estimator estimates in place of what is measured.
 

@@ -91,7 +91,10 @@ def linear_plant(assembly: Assembly) -> LinearPlant:
     outputs = np.concatenate([_reported(truth, field) for field in measured.values()], axis=1)
     of_states = np.ix_(kept, kept)
     sensors = assembly.scenario.sensors
-    noise = [np.full(prod(f.shape), _noise(sensors.get(name))) for name, f in measured.items()]
+    control = assembly.scenario.rates.control
+    noise = [
+        np.full(prod(f.shape), _noise(sensors.get(name), control)) for name, f in measured.items()
+    ]
     return LinearPlant(
         A=np.vstack([kinematics(model, assembly.qvel, nx), dynamics[:, :nx]])[of_states],
         B=np.vstack([np.zeros((model.nv, nu)), dynamics[:, nx:]])[kept],
@@ -237,8 +240,8 @@ def _reported(truth: Any, field: Field) -> Array:
     return attitude.to_rotation_vector(error)
 
 
-def _noise(sensor: Any) -> float:
-    return 0.0 if sensor is None else float(sensor.noise_std)
+def _noise(sensor: Any, control: float) -> float:
+    return 0.0 if sensor is None else float(sensor.noise(sensor.period or control))
 
 
 def _units(fields: Fields) -> Iterator[str]:

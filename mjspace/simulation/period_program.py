@@ -20,6 +20,12 @@ class Recorded(NamedTuple):
     array: np.ndarray
 
 
+def recorded_of(group: str, arrays: Any) -> list[Recorded]:
+    """Return the fields of a named tuple, which may be empty."""
+    names = getattr(arrays, "_fields", ())
+    return [Recorded(group, name, array) for name, array in zip(names, arrays, strict=True)]
+
+
 class Section(NamedTuple):
     """A part of the program that is called by itself."""
 
@@ -59,8 +65,8 @@ class PeriodProgram:
     """The law's state, a named tuple of arrays (1, ...), or empty."""
     sensors: dict[str, np.ndarray]
     """What the sensors remember, (1, ...)."""
-    biases: dict[str, np.ndarray]
-    """The constant bias of each sensor that is not ideal, (1, axes)."""
+    constants: dict[str, np.ndarray]
+    """What is constant of the errors of each sensor that is not ideal, (1, ...)."""
     draws: dict[str, np.ndarray]
     """Random numbers of a sample, (1, axes), as ``SensorSuite.draws`` names them."""
     known: tuple[np.ndarray, ...]

@@ -5,8 +5,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjspace.actuators.base import DIPOLE
 from mjspace.contract import REPORTED_BY_PLANT, Array, Measurement, Truth
-from mjspace.environment import kepler
+from mjspace.environment.magnetic_field import MOMENT
 from mjspace.scenario.sensors import ALWAYS, kind_of
 from mjspace.sensors.base import Motion
 from mjspace.sensors.magnetometer import Magnetometer
@@ -18,6 +19,8 @@ from mjspace.simulation.whereabouts import Whereabouts, whereabouts_at
 
 _TRANSLATION = ("position", "velocity", "altitude")
 """Quantities that the truth has wherever a sensor measures the bus's translation."""
+_BEFORE_USERDATA = mujoco.mjtState.mjSTATE_INTEGRATION & (mujoco.mjtState.mjSTATE_USERDATA - 1)
+"""MuJoCo's parts of a row before the environment's parameters."""
 _VELOCIMETER, _MAGNETOMETER = Velocimeter(), Magnetometer()
 
 
@@ -41,17 +44,27 @@ class StateLayout:
         self.wheel_angle = _columns(before_qpos + vehicle.wheel_qpos)
         self.struts = _columns(before_qpos + vehicle.strut_qpos)
         self.feet = len(vehicle.strut_qpos)
-        kinds = {sensor.measures: sensor for sensor in assembly.scenario.sensors.values()}
+        sensors = assembly.scenario.sensors
+        kinds = {sensor.quantity(name): sensor for name, sensor in sensors.items()}
         if any(sensor.of_translation for sensor in kinds.values()):
             kinds = {name: kind_of(name)() for name in _TRANSLATION} | kinds
+        if any(sensor.measures == "magnetic_field" for sensor in kinds.values()):
+            kinds["magnetic_field"] = _MAGNETOMETER  # whatever the coils add at a sensor
         self.surroundings = assembly.surroundings
         self.measured = {
             quantity: sensor
             for quantity, sensor in kinds.items()
-            if quantity not in (*ALWAYS, "model") and not sensor.integrates
+            if sensor.measures not in (*ALWAYS, "model") and not sensor.integrates
         }
         self.environment = assembly.scenario.environment
         self.boresights = assembly.scenario.plant.boresights
+        self.seen = {
+            f"{name}_valid": sensor for name, sensor in sensors.items() if not sensor.sees_always
+        }
+        drives = [kind.drives for kind in assembly.actuators.kinds]
+        userdata = mujoco.mj_stateSize(model, _BEFORE_USERDATA)
+        moment = slice(userdata + MOMENT.start, userdata + MOMENT.stop)
+        self.dipole = moment if DIPOLE in drives else None
 
     def truth(self, physics: Array) -> Measurement:
         """Return what ideal sensors report, as views of the state rows where that is possible.
@@ -63,10 +76,11 @@ class StateLayout:
             none = np.zeros((*physics.shape[:-1], self.feet))
             one = none[..., :1]
             truth = truth._replace(contact=one, foot_contact=none, hull_contact=one)
-        if self.measured:
+        if self.measured or self.seen:
             motion = self.moving_bus(physics)
             measured = {name: sensor.true_value(motion) for name, sensor in self.measured.items()}
-            truth = truth._replace(**measured)
+            seen = {name: sensor.sees(motion) for name, sensor in self.seen.items()}
+            truth = truth._replace(**measured, **seen)
         return truth
 
     def with_surroundings(self, physics: Array, truth: Measurement) -> Truth:
@@ -79,14 +93,11 @@ class StateLayout:
             "ground_velocity": _VELOCIMETER.true_value(motion),
             "magnetic_field": _MAGNETOMETER.true_value(motion),
         }
-        vehicles, time, orbit = len(physics), float(physics[0, 0]), self.environment.orbit
-        elements = None if orbit is None else orbit.rows(np.array([time]))[0]
-        place = np.empty(0) if elements is None else kepler.position(elements, time)
-        speed = np.empty(0) if elements is None else kepler.velocity(elements, time)
-        known["orbit_position"] = np.tile(place, (vehicles, 1))
-        known["orbit_velocity"] = np.tile(speed, (vehicles, 1))
-        none = np.empty((vehicles, 0))
-        known |= (sunlight_at(motion, self.environment) or Sunlight(none, none))._asdict()
+        none, around = np.empty((len(physics), 0)), motion.surroundings
+        for name in ("orbit_position", "orbit_velocity"):
+            at = getattr(around, name)
+            known[name] = none if at is None else at(motion.time)
+        known |= (sunlight_at(motion) or Sunlight(none, none))._asdict()
         known |= (whereabouts_at(motion, self.environment) or Whereabouts(*[none] * 4))._asdict()
         return Truth(**{name: known[name] for name in Truth._fields})
 
@@ -96,10 +107,9 @@ class StateLayout:
         Nothing where that is not known.
         """
         motion = self.moving_bus(physics)
-        sun = sunlight_at(motion, self.environment)
-        where = whereabouts_at(motion, self.environment)
+        sun, where = sunlight_at(motion), whereabouts_at(motion, self.environment)
         found = {n: a for one in (sun, where) if one is not None for n, a in one._asdict().items()}
-        return found | angles_at(motion, found, self.boresights, self.environment)
+        return found | angles_at(motion, found, self.boresights)
 
     def moving_bus(self, physics: Array) -> Motion:
         """Return the bus's motion, as views of the state rows."""
@@ -111,6 +121,7 @@ class StateLayout:
             physics[..., self.position],
             physics[..., self.velocity],
             self.surroundings,
+            None if self.dipole is None else physics[..., self.dipole],
         )
 
     def motion(self, physics: Array) -> Measurement:

@@ -12,6 +12,7 @@ from mjspace.contract import Array, Event, Measurement
 from mjspace.environment.install import install_callbacks
 from mjspace.errors import FlightError, InputError, failure
 from mjspace.interrupts import Interrupted
+from mjspace.sensors.fault_kinds import PHASE
 from mjspace.simulation import mujoco_warnings
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
@@ -205,7 +206,8 @@ class Stepper:
         return sealed(truth_of(physics, self.memory, self.layout, self._actuators, self.effects))
 
     def _measure(self, step: int, truth: Measurement) -> Measurement:
-        self.sensors, measurement = self._suite.sample(self.sensors, step, truth)
+        phase = self.memory.get(PHASE)
+        self.sensors, measurement = self._suite.sample(self.sensors, step, truth, phase)
         return measurement if measurement is truth else sealed(measurement)
 
     def _drive(

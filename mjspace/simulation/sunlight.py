@@ -1,15 +1,10 @@
 """The Sun as a vehicle sees it: its direction, the part of it that is visible, and eclipses."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from mjspace import attitude
 from mjspace.contract import Array
-from mjspace.environment.shadow import visible_at
-from mjspace.environment.solar_pressure import shadow_radii
-from mjspace.scenario.environment import Environment
 from mjspace.scenario.scenario import EventTable
+from mjspace.sensors import sky
 from mjspace.sensors.base import Motion
 
 _ROUNDING = 1e-9
@@ -32,15 +27,8 @@ class Sunlight(NamedTuple):
     """Part of its disc that the Earth's shadow leaves visible, 0 to 1, (..., 1)."""
 
 
-def sunlight_at(motion: Motion, environment: Environment) -> Sunlight | None:
+def sunlight_at(motion: Motion) -> Sunlight | None:
     """Return what is seen of the Sun at ``motion``; None where it is not known."""
-    around: Any = motion.surroundings
-    if around.sun_position is None:
+    if motion.surroundings.sun_position is None:
         return None
-    place = around.orbit_position(motion.time) + motion.position
-    sun = around.sun_position(motion.time)
-    sight = sun - place
-    sight /= np.sqrt(np.sum(sight**2, axis=-1, keepdims=True))
-    rows = (np.ascontiguousarray(vectors.reshape(-1, 3)) for vectors in (place, sun))
-    part = visible_at(*rows, *shadow_radii(environment)).reshape(*place.shape[:-1], 1)
-    return Sunlight(attitude.rotate(attitude.conjugate(motion.attitude), sight), part)
+    return Sunlight(sky.sun_direction(motion), sky.sunlight(motion))

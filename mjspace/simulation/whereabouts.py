@@ -4,10 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.environment.earth_rotation import geodetic
 from mjspace.scenario.environment import Environment
+from mjspace.sensors import sky
 from mjspace.sensors.base import Motion
 
 
@@ -29,10 +29,8 @@ def whereabouts_at(motion: Motion, environment: Environment) -> Whereabouts | No
     around: Any = motion.surroundings
     if around.moon_position is None or environment.time_zero is None:
         return None
-    place = around.orbit_position(motion.time) + motion.position
-    sight = attitude.normalize(around.moon_position(motion.time) - place)
-    longitude, latitude, height = geodetic(environment.time_zero, place, motion.time)
+    longitude, latitude, height = geodetic(environment.time_zero, sky.place(motion), motion.time)
     return Whereabouts(
-        attitude.rotate(attitude.conjugate(motion.attitude), sight),
+        sky.moon_direction(motion),
         *(np.asarray(x)[..., None] for x in (latitude, longitude, height)),
     )

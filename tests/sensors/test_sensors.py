@@ -462,12 +462,12 @@ def test_any_number_of_wheels_is_read(wheels: int) -> None:
             r"sensors\.rate\.period: 0\.0025 s .* 0\.002 s and 0\.003 s",
         ),
         (
-            {"rate": {"period": 2e-3, "delay": 5e-3}},
-            r"sensors\.rate\.delay: 0\.005 s .* sensors\.rate\.period, 0\.002 s: .* 0\.004 s and",
+            {"rate": {"period": 2e-3, "delay": 5.5e-3}},
+            r"sensors\.rate\.delay: 0\.0055 s .* rates\.physics, 0\.001 s: .* 0\.005 s and",
         ),
         (
             {"attitude": {"delay": 4e-4}},
-            r"sensors\.attitude\.delay: .* rates\.control, 0\.001 s: .* 0\.001 s",
+            r"sensors\.attitude\.delay: .* rates\.physics, 0\.001 s: .* 0\.001 s",
         ),
         ({"attitude": {"quantization": 1.0}}, r"attitude\.quantization\s.* less than 1"),
     ],
@@ -557,7 +557,7 @@ def test_a_measurement_is_what_it_was_made_of() -> None:
         ({"st": 3}, "got 3, should be a table"),
         ({"s t": {"measures": "rate"}}, "String should match pattern"),
         ({"rate": {"noise": 1.0}}, "noise is now noise_std: the standard deviation"),
-        ({"rate": {"bias": 1.0, "noise": 0}}, "noise is now noise_std and bias is now bias_std"),
+        ({"rate": {"bias_instability": 1.0}}, "bias_instability and correlation_time: give both"),
     ],
 )
 def test_what_is_no_sensor_is_refused(tables: dict[str, Any], message: str) -> None:

@@ -91,6 +91,9 @@ def _measured(assembly: Assembly) -> dict[str, Field]:
             _sentence(about.get(quantity, quantity.replace("_", " "))),
             quantity,
         )
+        valid = f"{name}_valid"
+        if valid in measurement._fields:
+            found[valid] = Field((1,), "", f"1 where {name} is valid, else 0", valid)
     for own in assembly.vehicle.sensors:
         if own.field not in measurement._fields or own.field in found:
             continue  # a sensor of the scenario reports it
