@@ -24,7 +24,7 @@ from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.known_beforehand import Known, known_of, seen_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
-from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
+from mjspace.vehicle import deployments, ground, ground_contact, other_spacecraft, own_model
 from mjspace.vehicle.vehicle import Vehicle, build, driven_by, initial_state
 
 METHODS = {
@@ -77,7 +77,8 @@ class Assembly:
     @property
     def surroundings(self) -> Surroundings:
         """What the sensors need to know of the vehicle and of where it flies."""
-        orbit = self.scenario.environment.orbit
+        orbit, gravity = self.scenario.environment.orbit, self.scenario.environment.gravity
+        height = {} if gravity is None else {"height": gravity.height}
         return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
             own_sensors={
@@ -86,6 +87,7 @@ class Assembly:
             | {f"{n}_closed": OwnSensor(1, "", False) for n in self.scenario.plant.connections},
             gravity=self._gravity,
             orbit_position=None if orbit is None else partial(orbit_position, orbit),
+            **height,
             **{name: one.at for name, one in seen_of(self.known).items()},
         )
 
@@ -226,7 +228,7 @@ def under_inner_loop(assembly: Assembly) -> Assembly:
 
 
 def facts_of(vehicle: Vehicle, scenario: Scenario) -> dict[str, Any]:
-    """Return the vehicle's properties, and the periods [s], that a law may take from them."""
+    """Return the vehicle's properties, its ground's map and the periods [s] that a law may take."""
     facts = {
         "inertia": vehicle.inertia,
         "wheel_axes": vehicle.wheel_axes,
@@ -236,7 +238,7 @@ def facts_of(vehicle: Vehicle, scenario: Scenario) -> dict[str, Any]:
     }
     for table in scenario.plant.equipment.values():
         facts |= table.facts(vehicle)
-    return facts | model_motors.facts_of(vehicle)
+    return facts | ground.map_of(vehicle.model) | model_motors.facts_of(vehicle)
 
 
 def _component(

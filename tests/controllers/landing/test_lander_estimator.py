@@ -48,7 +48,7 @@ class Sensors:
             position=truth.position + self.noise(gains.position_fix),
             velocity=truth.velocity + self.noise(gains.velocity_fix),
             specific_force=felt + self.force_bias + self.noise(gains.accelerometer_noise),
-            altitude=truth.position[..., 2:] + self.noise(gains.altimeter_noise, slice(1)),
+            altitude=gains.altitude(truth.position) + self.noise(gains.altimeter_noise, slice(1)),
             ground_velocity=own + self.noise(gains.velocimeter_noise),
         )
 
