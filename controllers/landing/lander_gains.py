@@ -48,8 +48,8 @@ class GimballedEngine(LunarGravity):
     gimbal_limit: float = gain("rad", default=np.radians(20.0), above=0.0, at_most=np.pi)
     """Largest deflection of either gimbal."""
     tank: float = gain("kg", default=0.0, at_least=0.0)
-    """Propellant at the start: m decreases with what the gauge measures as burnt. 0: m is constant.
-    """
+    """Propellant of all tanks at the start: m decreases with what the gauges measure as burnt. 0: m
+    is constant."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,7 +65,8 @@ class GimballedEngine(LunarGravity):
         return np.clip(commanded, low, high)
 
     def mass_with(self, propellant: Array) -> Array | float:
-        """Return m less what is burnt, (..., 1), or m; ``propellant`` [kg] as measured."""
+        """Return m less what is burnt, (..., 1), or m; ``propellant`` [kg] is of each tank."""
         if not self.tank or not propellant.shape[-1]:
             return self.mass
-        return self.mass - (self.tank - propellant)
+        left: Array = propellant.sum(axis=-1, keepdims=True)
+        return self.mass - (self.tank - left)
