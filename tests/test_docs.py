@@ -28,7 +28,7 @@ PAGES = [
     if re.search(r"^```(python|console)", page.read_text(), re.M)
     if page.name != "extending.md"  # each of its recipes has a test of its own
 ]
-LONG_PAGES = {"docs/lander.md", "docs/rendering.md"}
+LONG_PAGES = {"docs/lander.md", "docs/lander_descent.md", "docs/rendering.md"}
 """Those that take most of a minute."""
 TEXTS = [
     path

@@ -80,9 +80,6 @@ class VariableStructure(GimballedEngine):
     """delta."""
     radius: float = gain("m", default=1e4, above=0.0)
     """re: the distance from the site for which K is designed."""
-    tank: float = gain("kg", default=0.0, at_least=0.0)
-    """Propellant at the start: m decreases with what the gauge measures as burnt. 0: m is constant.
-    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -170,14 +167,8 @@ class VariableStructure(GimballedEngine):
         if not self.follows_gravity:
             return self.equilibrium_thrust + U1
         needed = (desired.linear_acceleration - self.gravity(desired.position))[..., 2:]
-        thrust: Array = self._mass(propellant) * (needed + U1) / np.maximum(0.5, upright)
+        thrust: Array = self.mass_with(propellant) * (needed + U1) / np.maximum(0.5, upright)
         return thrust
-
-    def _mass(self, propellant: Array) -> Array | float:
-        """Return m less what is burnt, (..., 1), or m."""
-        if not self.tank or not propellant.shape[-1]:
-            return self.mass
-        return self.mass - (self.tank - propellant)
 
     @cached_property
     def _feedback(self) -> Array:

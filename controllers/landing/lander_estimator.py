@@ -10,8 +10,9 @@ import numpy as np
 
 from mjspace.contract import Array, Measurement, Trajectory
 
-from . import lander, lander_vectoring
+from . import lander, lander_vectoring, powered_descent
 from .lander_filter import FilterState, Navigation
+from .landing_site import SiteReference
 
 
 class Estimates(NamedTuple):
@@ -37,6 +38,8 @@ StructureState = _joined("StructureState", lander.State, FilterState)
 StructureSignals = _joined("StructureSignals", lander.Signals, Estimates)
 VectoringState = _joined("VectoringState", lander_vectoring.State, FilterState)
 VectoringSignals = _joined("VectoringSignals", lander_vectoring.Signals, Estimates)
+DescentState = _joined("DescentState", powered_descent.State, FilterState)
+DescentSignals = _joined("DescentSignals", powered_descent.Signals, Estimates)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +78,25 @@ class EstimatedVectoring(lander_vectoring.ThrustVectoring, Navigation):
         after, command, signals = super().step(own, time, estimated, reference)
         joined = VectoringSignals(*signals, *_estimates(estimate))
         return VectoringState(*after, *estimate), command, joined
+
+
+@dataclass(frozen=True, kw_only=True)
+class EstimatedDescent(powered_descent.PoweredDescent, Navigation):
+    """``powered_descent.PoweredDescent`` on estimates."""
+
+    def reset(self, measurement: Measurement, reference: Trajectory) -> Any:
+        """Return the law's initial state and the initial estimates."""
+        return DescentState(*super().reset(measurement, reference), *self.fix(measurement))
+
+    def step(  # type: ignore[override]
+        self, state: Any, time: float, measurement: Measurement, reference: SiteReference
+    ) -> tuple[Any, Any, Any]:
+        """Return the next state, the command, and the signals of law and filter."""
+        estimate, estimated = _navigated(self, state, measurement)
+        own = powered_descent.State(*state[: -len(FilterState._fields)])
+        after, command, signals = super().step(own, time, estimated, reference)
+        joined = DescentSignals(*signals, *_estimates(estimate))
+        return DescentState(*after, *estimate), command, joined
 
 
 def _navigated(

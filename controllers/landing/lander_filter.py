@@ -5,7 +5,7 @@ bias); the attitude error is a small rotation in body axes. Sola, "Quaternion ki
 error-state Kalman filter", 2017, sections 5.4 and 6, whose reset (6.3) is left out: it changes the
 covariance by the product of two small angles. World axes as in ``descent``. No sensor measures the
 horizontal position: its error starts as that of the initial fix and grows with the integrated error
-of the velocimeter.
+of the velocimeter. The altimeter measures the height above the Moon's sphere.
 """
 
 from dataclasses import dataclass
@@ -100,9 +100,10 @@ class Navigation(LunarGravity):
         p, v, q, b, P = self._predicted(estimate, measurement)
         altitude, ground_velocity = measurement.altitude, measurement.ground_velocity
         x = np.zeros_like(P[..., 0])
-        H = np.eye(15)[2:3]
+        H = np.zeros_like(P[..., :1, :])
+        H[..., 0, POSITION] = self.upward(p)
         fresh = altitude != estimate.last_aid[..., :1]
-        innovation = altitude - p[..., 2:]
+        innovation = altitude - self.altitude(p)
         x, P, _ = corrected(x, P, H, innovation, self.altimeter_noise, fresh)
 
         R_T = transpose(to_matrix(q))

@@ -24,6 +24,18 @@ class LunarGravity(Gains):
         gravity: Array = -self.gravity_parameter * away / (square * np.sqrt(square))
         return gravity
 
+    def altitude(self, position: Array) -> Array:
+        """Return the height above the sphere [m], (..., 1), at a ``position`` [m], (..., 3)."""
+        square = dot(position, position) + 2.0 * self.moon_radius * position[..., 2:]
+        found: Array = square / (self.moon_radius + np.sqrt(square + self.moon_radius**2))
+        return found
+
+    def upward(self, position: Array) -> Array:
+        """Return the unit vector away from the Moon's centre, world axes, (..., 3)."""
+        away = position + np.array([0.0, 0.0, self.moon_radius])
+        upward: Array = away / np.sqrt(dot(away, away))
+        return upward
+
 
 @dataclass(frozen=True, kw_only=True)
 class GimballedEngine(LunarGravity):
@@ -35,6 +47,9 @@ class GimballedEngine(LunarGravity):
     """Least and largest thrust. At zero thrust the gimbals give no torque."""
     gimbal_limit: float = gain("rad", default=np.radians(20.0), above=0.0, at_most=np.pi)
     """Largest deflection of either gimbal."""
+    tank: float = gain("kg", default=0.0, at_least=0.0)
+    """Propellant of all tanks at the start: m decreases with what the gauges measure as burnt. 0: m
+    is constant."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -48,3 +63,10 @@ class GimballedEngine(LunarGravity):
         (least, most), angle = self.thrust_range, self.gimbal_limit
         low, high = np.array([least, -angle, -angle]), np.array([most, angle, angle])
         return np.clip(commanded, low, high)
+
+    def mass_with(self, propellant: Array) -> Array | float:
+        """Return m less what is burnt, (..., 1), or m; ``propellant`` [kg] is of each tank."""
+        if not self.tank or not propellant.shape[-1]:
+            return self.mass
+        left: Array = propellant.sum(axis=-1, keepdims=True)
+        return self.mass - (self.tank - left)

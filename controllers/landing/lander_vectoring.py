@@ -100,11 +100,7 @@ class ThrustVectoring(GimballedEngine):
         """Return the next state, the thrust and gimbal angles, and the errors."""
         error = measurement.position - reference.position
         pointing, thrust, torque = self._wanted(state.integral, measurement, reference)
-        # The torque is lever F (sin b1, -cos b1 sin b2, 0).
-        lever = self.lever * np.clip(thrust, *self.thrust_range)
-        b1 = np.arcsin(np.clip(torque[..., :1] / lever, -1.0, 1.0))
-        b2 = -np.arcsin(np.clip(torque[..., 1:2] / (lever * np.cos(b1)), -1.0, 1.0))
-        commanded = np.concatenate([thrust, b1, b2], axis=-1)
+        commanded = self._deflected(thrust, torque)
 
         integrated = np.clip(error, -self.integral_reach, self.integral_reach)
         cut = touched(state.cut, measurement)
@@ -112,21 +108,36 @@ class ThrustVectoring(GimballedEngine):
         signals = Signals(error, pointing[..., :2], commanded[..., :1], commanded[..., :0:-1])
         return after, burning(cut, self.limited(commanded)), signals
 
+    def _deflected(self, thrust: Array, torque: Array) -> Array:
+        """Return thrust and gimbal angles [F, b1, b2] [N, rad] that give a torque, (..., 3)."""
+        # The torque is lever F (sin b1, -cos b1 sin b2, 0).
+        lever = self.lever * np.clip(thrust, *self.thrust_range)
+        b1 = np.arcsin(np.clip(torque[..., :1] / lever, -1.0, 1.0))
+        b2 = -np.arcsin(np.clip(torque[..., 1:2] / (lever * np.cos(b1)), -1.0, 1.0))
+        return np.concatenate([thrust, b1, b2], axis=-1)
+
     def _wanted(
         self, integral: Array, measurement: Measurement, reference: Trajectory
     ) -> tuple[Array, Array, Array]:
         """Return the pointing error, the thrust [N] and the torque [N m], body axes."""
-        at, desired, w = measurement, reference, measurement.rate
+        force = self._desired_force(measurement, reference, integral)
+        return self._steered(force, measurement, reference)
+
+    def _steered(
+        self, force: Array, at: Measurement, desired: Trajectory
+    ) -> tuple[Array, Array, Array]:
+        """Return what ``_wanted`` does for a desired thrust over mass [m/s^2], world axes."""
+        w = at.rate
         to_body = conjugate(at.attitude)
-        f = rotate(to_body, self._desired_force(at, desired, integral))
+        f = rotate(to_body, force)
         pointing = cross(_THRUST_AXIS, f) / np.sqrt(dot(f, f))
 
         from_desired = multiply(to_body, desired.attitude)
-        turn = _shortened(self.pointing_gain * pointing, self.turn_limit)
+        turn = shortened(self.pointing_gain * pointing, self.turn_limit)
         rate = rotate(from_desired, desired.rate) + turn
         spin = rotate(from_desired, desired.acceleration) + self.rate_gain * (rate - w)
         torque = times(self.inertia, spin) + cross(w, times(self.inertia, w))
-        return pointing, self.mass * f[..., 2:], torque
+        return pointing, self.mass_with(at.propellant) * f[..., 2:], torque
 
     def _desired_force(
         self, measurement: Measurement, reference: Trajectory, integral: Array
@@ -136,15 +147,19 @@ class ThrustVectoring(GimballedEngine):
         velocity_error = measurement.velocity - reference.velocity
         feedback = self.velocity_gain * velocity_error + self.position_gain * position_error
         f = reference.linear_acceleration - self.gravity(measurement.position)
-        f = f - _shortened(feedback, self.feedback_limit) - self.integral_gain * integral
-        up = np.maximum(f[..., 2:], self.thrust_range[0] / self.mass)
-        aside = _shortened(f[..., :2], np.tan(self.tilt_limit) * up)
+        f = f - shortened(feedback, self.feedback_limit) - self.integral_gain * integral
+        return self._upright(f, measurement.propellant)
+
+    def _upright(self, f: Array, propellant: Array) -> Array:
+        """Return a thrust over mass [m/s^2] that points up within the tilt limit, (..., 3)."""
+        up = np.maximum(f[..., 2:], self.thrust_range[0] / self.mass_with(propellant))
+        aside = shortened(f[..., :2], np.tan(self.tilt_limit) * up)
         return np.concatenate([aside, up], axis=-1)
 
 
 _THRUST_AXIS = np.array([0.0, 0.0, 1.0])
 
 
-def _shortened(vector: Array, longest: Array | float) -> Array:
+def shortened(vector: Array, longest: Array | float) -> Array:
     """Return the ``vector`` with a length of at most ``longest``, a number or (..., 1)."""
     return longest / np.maximum(np.sqrt(dot(vector, vector)), longest) * vector

@@ -92,6 +92,15 @@ class CentralGravity(Term):
         result: Array = -gm / distance**3 * from_centre
         return result
 
+    def height(self, position: Array) -> Array:
+        """Return the height above the sphere [m], (..., 1), at ``position`` [m], (..., 3)."""
+        _, radius = self.parameters()
+        up = position[..., 2:]
+        square = np.sum(position**2, axis=-1, keepdims=True) + 2.0 * radius * up
+        # Not the difference of two distances of 1e6 m, which would leave 1e-10 m of it.
+        result: Array = square / (radius + np.sqrt(square + radius**2))
+        return result
+
     def check_environment(self, environment: Environment) -> None:
         """Refuse a free-fall frame."""
         if environment.orbit is not None:

@@ -1,4 +1,4 @@
-"""Altimeters: the height above flat ground."""
+"""Altimeters: the height above the planet that is landed on."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -9,7 +9,10 @@ from mjspace.sensors.linear import Linear
 
 
 class Altimeter(Linear[Annotated[NonNegative, Si("m")]]):
-    """Altimeter: the height of the bus above the plane z = 0."""
+    """Altimeter: the height of the bus above the sphere of ``environment.gravity``.
+
+    Without gravity it is that above the plane z = 0. Neither knows the relief of ``plant.ground``.
+    """
 
     measures: Literal["altitude"] = "altitude"
     unit: ClassVar[str] = "m"
@@ -18,4 +21,4 @@ class Altimeter(Linear[Annotated[NonNegative, Si("m")]]):
 
     def true_value(self, motion: Motion) -> Array:
         """Return the height [m], (..., 1)."""
-        return motion.position[..., 2:]
+        return motion.surroundings.height(motion.position)

@@ -61,6 +61,8 @@ class Surroundings:
     """The sensors of the vehicle's own model, by the field of the truth that they have read."""
     gravity: Callable[[Array], Array] = np.zeros_like
     """What accelerometers do not measure [m/s^2], (..., 3), at each position [m], (..., 3)."""
+    height: Callable[[Array], Array] = lambda position: position[..., 2:]
+    """What altimeters measure [m], (..., 1), at each position [m], (..., 3)."""
     magnetic_field: Callable[[Array], Array] | None = None
     """Of the Earth, inertial axes [T], (..., 3), at each time [s], (...)."""
     sun_position: Callable[[Array], Array] | None = None

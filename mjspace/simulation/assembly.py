@@ -29,7 +29,7 @@ from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.estimated_law import EstimatedLaw, refuse_inner_loop
 from mjspace.simulation.known_beforehand import Known, known_of, seen_of
 from mjspace.simulation.unbatched_law import UnbatchedLaw
-from mjspace.vehicle import deployments, ground_contact, other_spacecraft, own_model
+from mjspace.vehicle import deployments, ground, ground_contact, other_spacecraft, own_model
 from mjspace.vehicle.vehicle import Vehicle, build, driven_by, initial_state
 
 METHODS = {
@@ -87,8 +87,9 @@ class Assembly:
     def surroundings(self) -> Surroundings:
         """What the sensors need to know of the vehicle and of where it flies."""
         environment = self.scenario.environment
-        orbit = environment.orbit
+        orbit, gravity = environment.orbit, environment.gravity
         radii = shadow_radii(environment)
+        height = {} if gravity is None else {"height": gravity.height}
         return Surroundings(
             wheels=len(self.vehicle.wheel_dof),
             own_sensors={
@@ -100,6 +101,7 @@ class Assembly:
             orbit_velocity=None if orbit is None else partial(orbit_velocity, orbit),
             planet_radius=0.0 if orbit is None else RADIUS[orbit.body],
             sunlight=lambda place, sun: visible_from(place, sun, *radii),
+            **height,
             **{name: one.at for name, one in seen_of(self.known).items()},
         )
 
@@ -261,7 +263,7 @@ def under_inner_loop(assembly: Assembly) -> Assembly:
 
 
 def facts_of(vehicle: Vehicle, scenario: Scenario) -> dict[str, Any]:
-    """Return the vehicle's properties, and the periods [s], that a law may take from them."""
+    """Return the vehicle's properties, its ground's map and the periods [s] that a law may take."""
     facts = {
         "inertia": vehicle.inertia,
         "wheel_axes": vehicle.wheel_axes,
@@ -271,7 +273,7 @@ def facts_of(vehicle: Vehicle, scenario: Scenario) -> dict[str, Any]:
     }
     for table in scenario.plant.equipment.values():
         facts |= table.facts(vehicle)
-    return facts | model_motors.facts_of(vehicle)
+    return facts | ground.map_of(vehicle.model) | model_motors.facts_of(vehicle)
 
 
 def _component(

@@ -89,7 +89,7 @@ class StateLayout:
         known = truth._asdict() | {
             "position": motion.position,
             "velocity": motion.velocity,
-            "altitude": motion.position[..., 2:],
+            "altitude": self.surroundings.height(motion.position),
             "ground_velocity": _VELOCIMETER.true_value(motion),
             "magnetic_field": _MAGNETOMETER.true_value(motion),
         }

@@ -9,13 +9,20 @@ import pytest
 from lander_oracle import MOON_RADIUS, MU, fly
 from mjspace.controllers.landing.descent import SineDescent
 from mjspace.controllers.landing.guidance import BezierDescent
-from mjspace.controllers.landing.lander_estimator import EstimatedStructure, EstimatedVectoring
+from mjspace.controllers.landing.lander_estimator import (
+    EstimatedDescent,
+    EstimatedStructure,
+    EstimatedVectoring,
+)
 from mjspace.controllers.landing.lander_filter import FilterState, Navigation
+from mjspace.controllers.landing.landing_site import LandingSite
+from mjspace.controllers.landing.powered_descent import PoweredDescent
 
 from mjspace import attitude as att
 from mjspace.contract import Array, Measurement
 
 PERIOD, COUNT = 0.05, 40
+CENTRE = np.array([0.0, 0.0, -MOON_RADIUS])
 FILTER = Navigation(control_period=PERIOD, gyro_walk=0.0, accelerometer_walk=0.0)
 GOOD_FIX: dict[str, Any] = {
     "control_period": PERIOD, "position_fix": 1.0, "attitude_fix": 0.002
@@ -48,7 +55,7 @@ class Sensors:
             position=truth.position + self.noise(gains.position_fix),
             velocity=truth.velocity + self.noise(gains.velocity_fix),
             specific_force=felt + self.force_bias + self.noise(gains.accelerometer_noise),
-            altitude=truth.position[..., 2:] + self.noise(gains.altimeter_noise, slice(1)),
+            altitude=gains.altitude(truth.position) + self.noise(gains.altimeter_noise, slice(1)),
             ground_velocity=own + self.noise(gains.velocimeter_noise),
         )
 
@@ -169,6 +176,55 @@ def test_it_lands_on_its_estimates(law: Any, source: Any, duration: float) -> No
     # 5.6 and 11 m: 0.002 rad of azimuth are 5 m after 2.5 km by dead reckoning, and O3 misses by
     # 5.7 m even so.
     assert np.hypot(*flight.position[-1, :2]) < 16.0
+
+
+def in_orbit() -> Measurement:
+    """Return exact measurements 459 km from the site, 15 km above the sphere."""
+    place = np.array([[457598.0, 2000.0, -45780.0]])
+    above = np.linalg.norm(place - CENTRE, axis=-1, keepdims=True) - MOON_RADIUS
+    velocity = np.array([[-1633.24, 0.0, 441.65]])
+    return Measurement(
+        attitude=np.array([[1.0, 0.0, 0.0, 0.0]]),
+        rate=np.zeros((1, 3)),
+        position=place,
+        velocity=velocity,
+        specific_force=np.array([[2.2, 0.0, -0.4]]),
+        altitude=above,
+        ground_velocity=velocity,
+        propellant=np.array([[95.0]]),
+        contact=np.zeros((1, 1)),
+    )
+
+
+def test_exact_altitudes_leave_the_estimate_where_the_moon_has_curved_away() -> None:
+    seen = in_orbit()
+    estimate = FILTER.navigate(FILTER.fix(seen), seen)
+    assert estimate.estimated_position == pytest.approx(seen.position, abs=1e-6)
+    # An altitude that is 100 m too large raises it along the local vertical, not along z.
+    high = FILTER.navigate(FILTER.fix(seen), seen._replace(altitude=seen.altitude + 100.0))
+    up = (seen.position - CENTRE)[0]
+    rise = (high.estimated_position - seen.position)[0]
+    assert rise / np.linalg.norm(rise) == pytest.approx(up / np.linalg.norm(up), abs=1e-6)
+    assert np.linalg.norm(rise) == pytest.approx(100.0, rel=1e-3)
+
+
+def test_a_descent_on_estimates_is_that_at_the_estimates() -> None:
+    gains: dict[str, Any] = {"control_period": PERIOD, "mass": 175.0, "tank": 95.0}
+    own, plain = EstimatedDescent(**gains, position_fix=50.0), PoweredDescent(**gains)
+    seen, wanted = in_orbit(), LandingSite().at(np.zeros(1))
+    noisy = seen._replace(altitude=seen.altitude + 30.0)
+    state, command, signals = own.step(own.reset(seen, wanted), 0.0, noisy, wanted)
+    at = seen._replace(
+        position=state.estimated_position,
+        velocity=state.estimated_velocity,
+        attitude=state.estimated_attitude,
+        rate=-state.estimated_bias[..., 3:],
+    )
+    assert np.abs(at.position - seen.position).max() > 5.0
+    _, expected, _ = plain.step(plain.reset(seen, wanted), 0.0, at, wanted)
+    assert np.array_equal(command.thrust, expected.thrust)
+    assert np.array_equal(command.gimbal, expected.gimbal)
+    assert np.array_equal(signals.estimated_position, at.position)
 
 
 def test_a_missing_sensor_is_named() -> None:
