@@ -11,10 +11,10 @@ from hypothesis import settings
 from mjspace.runner.run import run
 from mjspace.simulation import loop
 
-# The same examples on every run where a failure could not be told from a change.
-settings.register_profile("ci", derandomize=True)
-if os.environ.get("CI"):
-    settings.load_profile("ci")
+# The first call of anything may compile it. In CI the examples are the same on every run, since a
+# failure could not be told from a change.
+settings.register_profile("mjspace", deadline=None, derandomize=bool(os.environ.get("CI")))
+settings.load_profile("mjspace")
 
 
 @pytest.fixture

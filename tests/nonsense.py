@@ -70,8 +70,8 @@ def kinds() -> Iterator[tuple[str, type]]:
 def gains_of(name: str, kind: type) -> dict[str, Any]:
     """Return gains that fit: those of a scenario that flies it, else made from the declaration."""
     for scenario in scenarios():
-        for component in (scenario.law, scenario.reference):
-            if component.kind == name:
+        for component in (scenario.law, scenario.reference, scenario.estimator):
+            if component is not None and component.kind == name:
                 return component.gains
     if name in UNFLOWN:
         return dict(UNFLOWN[name])

@@ -112,9 +112,9 @@ def levels(rooms: Mapping[str, Iterable[str]]) -> dict[str, int]:
     return found
 
 
-def test_rooms_stand_on_at_most_10_levels_below_the_entry_point() -> None:
+def test_rooms_stand_on_at_most_11_levels_below_the_entry_point() -> None:
     found = levels({room: may.split() for room, may in ROOMS.items()})
-    assert max(found[room] for room in ROOMS if room != "__main__") <= 10
+    assert max(found[room] for room in ROOMS if room != "__main__") <= 11
 
 
 def imports_of(room: str) -> set[str]:
