@@ -2,6 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from mjspace.errors import shortened
@@ -254,6 +255,9 @@ class Initial(Table):
     """Of the bus, inertial axes; in the free-fall frame when there is an orbit."""
     velocity: Velocity3 = [0.0, 0.0, 0.0]
     """Of the bus, inertial axes."""
+    on_reference: Switch = False
+    """Whether attitude and rate are the reference's and, where it has a position, position and
+    velocity too; what is given of them as well is refused."""
     wheel_speed: Annotated[list[Finite], Si("rad/s")] | None = None
     """Wheel speeds relative to what carries them; zero when left out. Bias speeds whose momenta
     cancel, as [b, -b, b, -b] in a pyramid, keep the wheels away from zero."""
@@ -275,4 +279,7 @@ class Initial(Table):
             raise ValueError("attitude and euler are both given: give one")
         if self.wheel_speed is not None and self.momentum is not None:
             raise ValueError("wheel_speed and momentum are both given: give one")
+        for name in ("attitude", "euler", "rate", "position", "velocity"):
+            if self.on_reference and np.any(getattr(self, name)):
+                raise ValueError(f"{name} and on_reference are both given: give one")
         return self

@@ -21,6 +21,7 @@ from mjspace.environment.shadow import visible_from
 from mjspace.environment.solar_pressure import shadow_radii
 from mjspace.errors import InputError, input_error_at
 from mjspace.scenario.construct import construct
+from mjspace.scenario.on_reference import on_reference
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.scenario.user_files import files_of, source_of
@@ -193,6 +194,7 @@ def assemble(
     facts["ephemeris"] = KnownEphemeris(scenario.environment)  # of a reference alone
     reference, flown["reference"] = _component("reference", scenario.reference, facts, own, sources)
     _part("reference", reference.at, np.array([0.0, scenario.duration]))
+    scenario = on_reference(scenario, reference)
     inner = _part("law", _has_inner_loop, law)
     if scenario.estimator is not None:
         _part("estimator", refuse_inner_loop, law)
