@@ -51,7 +51,7 @@ ROOMS = {
         "sensors signals tracing units vehicle"
     ),
     "runner": "contract errors interrupts log reporting scenario signals simulation units vehicle",
-    "campaign": "contract errors interrupts log runner scenario simulation units",
+    "campaign": "contract errors interrupts log reporting runner scenario simulation units",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",

@@ -1,9 +1,7 @@
 """The report of flights: what is on the page, that nothing of a stranger's runs, and its size."""
 
 import base64
-import json
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import chromium
 import numpy as np
 import pytest
 from command_lines import command_line
+from html_pages import Page, unpacked
 
 from mjspace.errors import NoRendererError
 from mjspace.log.reader import Log
@@ -48,38 +47,6 @@ requirement = "<i>ADCS-013</i>"
 """
 
 
-class Page(HTMLParser):
-    """Elements, attributes and text of a page."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.text = ""
-        self.scripts: list[str] = []
-        self._in = ""
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        self._in = tag
-        if tag == "script":
-            self.scripts.append("")
-
-    def handle_endtag(self, tag: str) -> None:
-        self._in = ""
-
-    def handle_data(self, data: str) -> None:
-        if self._in == "script":
-            self.scripts[-1] += data
-        elif self._in != "style":
-            self.text += f" {' '.join(data.split())}"
-
-    @property
-    def charts(self) -> dict[str, Any]:
-        found: dict[str, Any] = json.loads(self.scripts[0])
-        return found
-
-
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("evil")
@@ -98,10 +65,6 @@ def page(log: Path) -> Path:
 
 def no_renderer(*_: Any, **__: Any) -> None:
     raise NoRendererError("no OpenGL here")
-
-
-def unpacked(array: dict[str, Any]) -> np.ndarray:
-    return array["base"] + np.frombuffer(base64.b64decode(array["data"]), "<f4").astype(float)
 
 
 def test_the_page_says_what_was_flown_and_what_came_of_it(page: Path) -> None:

@@ -15,9 +15,20 @@
     return Array.from(new Float32Array(bytes.buffer), (value) => base + value);
   });
 
+  // Points, of which several may have one x.
+  const scattered = (series) => {
+    const points = series.flatMap((one, index) =>
+      unpacked[one.x].map((x, i) => ({ x, y: unpacked[one.y][i], index })),
+    );
+    points.sort((one, other) => one.x - other.x);
+    const column = (index) => points.map((p) => (p.index === index && Number.isFinite(p.y) ? p.y : null));
+    return [points.map((p) => p.x), ...series.map((_, index) => column(index))];
+  };
+
   // The lines of a chart have times of their own: on the union of them, what lies between two
   // points of a line is on the straight between them, as it is drawn.
-  const joined = (series) => {
+  const joined = ({ kind, series }) => {
+    if (kind === "points") return scattered(series);
     const table = uPlot.join(series.map((one) => [unpacked[one.x], unpacked[one.y]]));
     const time = table[0];
     for (const values of table.slice(1)) {
@@ -79,9 +90,8 @@
         y === null ? bbox.top : u.valToPos(y, "y", true),
       ];
       const [x0, y0] = place(bound.from);
-      let [x1, y1] = place(bound.to);
-      const upright = bound.from[0] === bound.to[0] && chart.kind === "bars";
-      if (upright) y1 = bbox.top + bbox.height;
+      const [x1, y1] = place(bound.to);
+      const upright = chart.kind === "bars";
       ctx.strokeStyle = ctx.fillStyle = upright ? color("--fail") : ink(bound.color);
       ctx.setLineDash([5 * ratio, 3 * ratio]);
       ctx.beginPath();
@@ -178,7 +188,7 @@
     }
     frame.append(title);
     area.append(frame);
-    const table = joined(chart.series);
+    const table = joined(chart);
     const axis = {
       stroke: () => color("--faint"),
       grid: { stroke: () => color("--line"), width: 1 },
