@@ -24,9 +24,10 @@ def report(
     ] = False,
 ) -> None:
     """Write a report of a log, of several side by side, or of a campaign, as one HTML file."""
+    from mjspace.campaign.results import DESCRIPTION
     from mjspace.runner.flight_report import write
 
-    if any(path.is_dir() for path in logs):
+    if any((path / DESCRIPTION).is_file() for path in logs):
         if len(logs) > 1 or signals or video:
             raise InputError(
                 "report: a campaign's folder stands alone, without --signal and --video; "

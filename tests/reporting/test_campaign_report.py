@@ -126,7 +126,7 @@ def test_the_campaign_itself_writes_it(folder: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (None, "campaign.json"),
+        (None, "Is a directory"),
         ("[]", "is no description of a campaign"),
         ("{", "campaign.json"),
         (json.dumps({"scenario": "duration = 'long'"}), "campaign.json"),

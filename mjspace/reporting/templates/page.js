@@ -98,15 +98,15 @@
       ctx.moveTo(x0, y0);
       ctx.lineTo(x1, y1);
       ctx.stroke();
-      const right = Math.min(x1, bbox.left + bbox.width) - 3 * ratio;
-      const space = ctx.measureText(bound.text).width;
-      ctx.textAlign = upright && x0 + space + 8 * ratio < bbox.left + bbox.width ? "left" : "right";
+      // The text ends where the line does; it begins at the left edge where it has no room there.
+      const space = ctx.measureText(bound.text).width + 8 * ratio;
+      const [left, end] = [bbox.left, bbox.left + bbox.width];
+      const beside = upright ? x0 + space < end : Math.min(x1, end) - space < left;
+      ctx.textAlign = beside ? "left" : "right";
+      const x = upright ? x0 : beside ? left : Math.min(x1, end);
       const above = y1 - bbox.top > 16 * ratio;
-      ctx.fillText(
-        bound.text,
-        upright ? x0 + (ctx.textAlign === "left" ? 4 : -4) * ratio : right,
-        upright ? bbox.top + 12 * ratio : y1 + (above ? -4 : 13) * ratio,
-      );
+      const y = upright ? bbox.top + 12 * ratio : y1 + (above ? -6 : 14) * ratio;
+      ctx.fillText(bound.text, x + (beside ? 4 : -4) * ratio, y);
     }
     ctx.restore();
   };
