@@ -89,12 +89,15 @@ def _claim(check: Check) -> str:
     """Return what is measured: the statistic, the signal and the window."""
     claim = f"{check.statistic} of {check.signal}"
     if check.target is not None:
-        claim += f" from {check.target}" + (", relative" if check.relative else "")
-    whence = f" after {check.since!r}" if check.since else ""
-    if check.statistic != "final" and (check.start or whence):
-        claim += f", from {check.start:g} s on{whence}"
-    if check.end is not None:
-        claim += f", to {check.end:g} s{whence}"
+        claim += f" less {check.target}" + (", relative" if check.relative else "")
+    begins = f"from {check.start:g} s" if check.statistic != "final" and check.start else ""
+    ends = "" if check.end is None else f"to {check.end:g} s"
+    if begins and check.start == check.end:
+        begins, ends = f"at {check.start:g} s", ""
+    after = f"after {check.since!r}" if check.since else ""
+    window = (begins, "on" if begins and check.end is None else ends, after)
+    if any(window):
+        claim += f", {' '.join(filter(None, window))}"
     if check.until:
         claim += f", until {check.until!r}"
     return claim

@@ -92,6 +92,8 @@
       const [x0, y0] = place(bound.from);
       const [x1, y1] = place(bound.to);
       const upright = chart.kind === "bars";
+      const [left, end] = [bbox.left, bbox.left + bbox.width];
+      if (x0 > end || x1 < left) continue;
       ctx.strokeStyle = ctx.fillStyle = upright ? color("--fail") : ink(bound.color);
       ctx.setLineDash([5 * ratio, 3 * ratio]);
       ctx.beginPath();
@@ -100,7 +102,6 @@
       ctx.stroke();
       // The text ends where the line does; it begins at the left edge where it has no room there.
       const space = ctx.measureText(bound.text).width + 8 * ratio;
-      const [left, end] = [bbox.left, bbox.left + bbox.width];
       const beside = upright ? x0 + space < end : Math.min(x1, end) - space < left;
       ctx.textAlign = beside ? "left" : "right";
       const x = upright ? x0 : beside ? left : Math.min(x1, end);
@@ -222,7 +223,7 @@
         },
       ],
       legend: { show: chart.kind !== "bars" },
-      cursor: chart.kind === "lines" ? { sync: { key: "time", setSeries: false } } : { drag: { x: true, y: false } },
+      cursor: chart.kind === "lines" ? { y: false, sync: { key: "time", setSeries: false } } : { drag: { x: true, y: false } },
       hooks: { draw: [annotate(chart)], setScale: chart.kind === "lines" ? [follow] : [] },
     };
     const plot = new uPlot(options, table, frame);
