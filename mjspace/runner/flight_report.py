@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from mjspace.log import topics
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.reporting import flight
@@ -82,7 +83,9 @@ def _unit(log: Log, check: Check) -> tuple[str, float]:
         topic, field, _ = find_signal(log.topics, check.signal)
     except ValueError:  # of a log whose topics are not those of its flight
         return "", 1.0
-    return Unit(log.units[topic].get(field, "")).displayed
+    si = log.units[topic].get(field, "")
+    declared = topics.units().get(topic, {}).get(field, Unit(si))
+    return (declared if declared.si == si else Unit(si)).displayed
 
 
 def _claim(check: Check) -> str:

@@ -17,6 +17,7 @@ from mjspace.plotting.panels import curves
 from mjspace.reporting import pictures
 from mjspace.runner import flight_report
 from mjspace.runner.run import run
+from mjspace.scenario.scenario import Check
 
 EVIL = "</script><script>document.title='caught'</script><img src=x onerror=alert(1)>"
 SCENARIO = f"""
@@ -128,6 +129,27 @@ def test_the_plots_are_the_curves_of_the_standard_page(page: Path) -> None:
     (bound,) = rate["bounds"]
     assert bound["text"] == "final < 16"
     assert bound["color"] == 0
+
+
+@pytest.mark.parametrize(
+    ("signal", "unit", "scale"),
+    [
+        ("truth.wheel_speed[0]", "rpm", 30.0 / np.pi),
+        ("truth.attitude_error", "deg", 180.0 / np.pi),
+        ("truth.momentum", "N m s", 1.0),
+        ("law.error", "", 1.0),
+        ("truth.nothing", "", 1.0),
+    ],
+)
+def test_a_number_is_in_the_unit_that_a_person_reads(
+    log: Path, signal: str, unit: str, scale: float
+) -> None:
+    check = Check(name="x", signal=signal, below=1.0)
+    found, factor = flight_report._unit(Log(log), check)
+    assert found == unit
+    assert factor == pytest.approx(scale)
+    ratio = Check(name="x", signal=signal, below=1.0, target=2.0, relative=True)
+    assert flight_report._unit(Log(log), ratio) == ("", 1.0)
 
 
 @chromium.needed

@@ -158,6 +158,7 @@
       width: one.desired ? 4 : 1.4,
       alpha: one.desired ? FAINT : 1,
       dash: DASHES[one.dash % DASHES.length],
+      pxAlign: 0,
       points: { show: false },
     };
   };
