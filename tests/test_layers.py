@@ -46,12 +46,13 @@ ROOMS = {
     "log": "attitude contract errors scenario signals units",
     "plotting": "contract errors log scenario signals units",
     "rendering": "attitude contract environment errors log scenario vehicle",
+    "reporting": "contract errors log plotting rendering scenario",
     "simulation": (
         "actuators algebra attitude contract environment errors interrupts log ranges scenario "
         "sensors signals tracing units vehicle"
     ),
-    "runner": "contract errors interrupts log scenario signals simulation units vehicle",
-    "campaign": "contract errors interrupts log runner scenario simulation units",
+    "runner": "contract errors interrupts log reporting scenario signals simulation units vehicle",
+    "campaign": "contract errors interrupts log reporting runner scenario simulation units",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",

@@ -12,9 +12,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from mjspace.campaign.flights import log_of
+from mjspace.campaign.results import WALL_TIME, JudgedResults
 from mjspace.campaign.robustness import relative
 from mjspace.campaign.statistics import CONFIDENCE, Gate, Rate, Spread, rank_correlation, spread
-from mjspace.campaign.store import WALL_TIME, Store
 from mjspace.errors import printable
 from mjspace.scenario.scenario import Check
 
@@ -74,7 +74,7 @@ class Answer:
         return self.rate.successes == self.rate.members > 0
 
 
-def answer(store: Store, gate: Gate | None) -> Answer:
+def answer(store: JudgedResults, gate: Gate | None) -> Answer:
     """Return what the members flown so far show; a column at a time is in memory."""
     passed = store.column("passed")
     rate = Rate(int(passed.sum()), len(passed))
@@ -108,7 +108,7 @@ def answer(store: Store, gate: Gate | None) -> Answer:
     )
 
 
-def _worst(store: Store, member: int, check: int) -> Worst:
+def _worst(store: JudgedResults, member: int, check: int) -> Worst:
     row = store.row(member)
     why = row["trouble"]
     if not why and check >= 0:

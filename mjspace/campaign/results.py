@@ -1,5 +1,6 @@
 """What a campaign's folder holds of the members flown: its Parquet files, read."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -7,8 +8,38 @@ from typing import Any
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.errors import InputError
+from mjspace.errors import InputError, input_error_at
 from mjspace.log.arrow import pyarrow_for
+from mjspace.runner.checks import NO_CRASH
+from mjspace.scenario import raw
+from mjspace.scenario.loading import validate
+from mjspace.scenario.scenario import Check, Scenario
+
+DESCRIPTION = "campaign.json"
+WALL_TIME = "wall_time"
+"""The one column that differs from flight to flight."""
+
+
+def draw_columns(scenario: Scenario) -> list[str]:
+    """Return the name of the column of each number drawn."""
+    found: list[str] = []
+    for dispersion in scenario.dispersions:
+        count = {"random_attitude": 4, "on_sphere": 3}.get(dispersion.distribution)
+        key = dispersion.key
+        found += [key] if count is None else [f"{key}[{i}]" for i in range(count)]
+    return found
+
+
+def checks_of(scenario: Scenario) -> dict[str, Check]:
+    """Return the checks of each flight, by names that are made unique."""
+    checks = list(scenario.checks)
+    if scenario.plant.ground is not None and all(c.signal != NO_CRASH.signal for c in checks):
+        checks.append(NO_CRASH)
+    found: dict[str, Check] = {}
+    for check in checks:
+        number = sum(check.name == other.name for other in found.values())
+        found[f"{check.name} ({number + 1})" if number else check.name] = check
+    return found
 
 
 class Results:
@@ -79,3 +110,44 @@ class Results:
             return self._arrow.parquet.read_table(path, columns=columns)
         except self._arrow.ArrowInvalid as error:
             raise InputError(f"{path}: {error}: remove it, and its members fly again") from error
+
+
+class JudgedResults(Results):
+    """The members that have been flown, with the checks and dispersions of their scenario."""
+
+    def __init__(self, folder: Path, scenario: Scenario) -> None:
+        """Name the ``folder``; nothing is read.
+
+        Raises:
+            InputError: Parquet's library is not installed.
+        """
+        super().__init__(folder)
+        self.scenario = scenario
+        self.draws, self.checks = draw_columns(scenario), checks_of(scenario)
+
+
+def results_in(folder: Path) -> JudgedResults:
+    """Return the results of the campaign in a folder, of which the scenario may be gone.
+
+    Raises:
+        InputError: there is none, or it is not valid for this version of mjspace.
+    """
+    description = folder / DESCRIPTION
+    with input_error_at(str(description)):
+        found = json.loads(description.read_text(encoding="utf-8"))
+        text = found.get("scenario") if isinstance(found, dict) else None
+        if not isinstance(text, str):
+            raise ValueError("is no description of a campaign")
+        table = raw.parsed(text)
+    scenario = validate(table, f"the scenario in {description}", context={"flown": True})
+    results = JudgedResults(folder, scenario)
+    columns = results.columns
+    if not columns:
+        raise InputError(f"{folder}: holds no member of a campaign")
+    of_checks = [
+        f"{n}: {what}" for n in results.checks for what in ("measured", "margin", "verdict")
+    ]
+    for name in ("passed", "trouble", WALL_TIME, *results.draws, *of_checks):
+        if name not in columns:
+            raise InputError(f"{folder}: its members lack {name!r}")
+    return results

@@ -11,43 +11,15 @@ from typing import Any
 
 from mjspace.campaign.flights import Flown
 from mjspace.campaign.members import Population
-from mjspace.campaign.results import Results
+from mjspace.campaign.results import DESCRIPTION, WALL_TIME, JudgedResults
 from mjspace.errors import InputError
 from mjspace.log import lock
 from mjspace.log.provenance import software
-from mjspace.runner.checks import NO_CRASH, Verdict, margin
+from mjspace.runner.checks import Verdict, margin
 from mjspace.runner.output import make_folder
-from mjspace.scenario.scenario import Check
-
-DESCRIPTION = "campaign.json"
-WALL_TIME = "wall_time"
-"""The one column that differs from flight to flight."""
 
 
-def draw_columns(members: Population) -> list[str]:
-    """Return the name of the column of each number drawn."""
-    found: list[str] = []
-    for dispersion in members.dispersions:
-        count = {"random_attitude": 4, "on_sphere": 3}.get(dispersion.distribution)
-        key = dispersion.key
-        found += [key] if count is None else [f"{key}[{i}]" for i in range(count)]
-    return found
-
-
-def checks_of(members: Population) -> dict[str, Check]:
-    """Return the checks of each flight, by names that are made unique."""
-    scenario = members.scenario
-    checks = list(scenario.checks)
-    if scenario.plant.ground is not None and all(c.signal != NO_CRASH.signal for c in checks):
-        checks.append(NO_CRASH)
-    found: dict[str, Check] = {}
-    for check in checks:
-        number = sum(check.name == other.name for other in found.values())
-        found[f"{check.name} ({number + 1})" if number else check.name] = check
-    return found
-
-
-class Store(Results):
+class Store(JudgedResults):
     """The folder of one campaign."""
 
     def __init__(self, folder: Path, members: Population) -> None:
@@ -56,9 +28,8 @@ class Store(Results):
         Raises:
             InputError: Parquet's library is not installed.
         """
-        super().__init__(folder)
+        super().__init__(folder, members.scenario)
         pyarrow = self._arrow
-        self.draws, self.checks = draw_columns(members), checks_of(members)
         self._members = members
         kinds = {"member": pyarrow.int64(), "seed": pyarrow.int64(), "passed": pyarrow.bool_()}
         kinds |= dict.fromkeys(self.draws, pyarrow.float64())

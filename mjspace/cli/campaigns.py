@@ -48,6 +48,9 @@ def campaign(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
     ] = None,
+    report_it: Annotated[
+        bool, typer.Option("--report", help="Also write a report of the answer: report.html.")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
     trust: Trust = False,
@@ -66,15 +69,25 @@ def campaign(
     what = Campaign(scenario, tuple(overrides), count, seed, trust)
     folder = flown.folder_of(what, out)
     if member is not None:
+        if report_it:
+            raise InputError("--report: is of a campaign; 'mjspace report' makes that of a log")
         _one(what, folder, member, force, as_json, traceback)
     with cause_shown(traceback), count_bar(count, "flying") as told:
         flight = flown.fly(what, folder, keep=keep.value, processes=workers, told=told)
     found = report.answer(flight.store, required)
+    pictures = {"report": folder / "report.html"} if report_it else {}
+    if report_it:
+        from mjspace.campaign import html_report
+
+        html_report.write(flight.store, found, pictures["report"])
     if as_json:
-        print(json.dumps(report.data(found), indent=2))
+        shown = {name: str(path) for name, path in pictures.items()}
+        print(json.dumps(report.data(found) | shown, indent=2))
     else:
         report.show(found)
         print(f"table  {folder / 'members'}")
+        for name, path in pictures.items():
+            print(f"{name:6} {path}")
     if flight.signal:
         done = f"{found.rate.members} of {count} flown; the same command goes on"
         print(f"mjspace: interrupted: {done}", file=sys.stderr)

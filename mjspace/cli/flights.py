@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, NamedTuple, NoReturn
 
 import typer
 
@@ -14,6 +14,7 @@ from mjspace.terminal.options import (
     LogFile,
     Out,
     Plot,
+    Report,
     Set,
     Traceback,
     Trust,
@@ -23,6 +24,14 @@ from mjspace.terminal.reporting import cause_shown, open_log, print_cause, progr
 
 if TYPE_CHECKING:
     from mjspace.runner.run import Result
+
+
+class Pictures(NamedTuple):
+    """What is made of a log, besides the verdict."""
+
+    plot: bool
+    video: bool
+    report: bool
 
 
 def run(
@@ -39,6 +48,7 @@ def run(
     duration: Annotated[str, typer.Option(help="Simulated time: 20, or '2 min'.")] = "",
     plot_it: Plot = False,
     video: Video = False,
+    report_it: Report = False,
     as_json: Json = False,
     trust: Trust = False,
     traceback: Traceback = False,
@@ -54,8 +64,8 @@ def run(
     if every == bool(scenario):
         raise InputError("run: give one SCENARIO, or --all; 'mjspace list' shows them")
     if every:
-        if plot_it or video:
-            raise InputError("--all: has no pictures; plot and render the logs that matter")
+        if plot_it or video or report_it:
+            raise InputError("--all: has no pictures; plot, render or report the logs that matter")
         _run_all([*overrides, *extra], output_folder(out, "all"), force, as_json)
     with cause_shown(traceback):
         loaded, folder = load(scenario, [*overrides, *extra])
@@ -63,7 +73,8 @@ def run(
         with progress_bar(loaded.duration, "flying") as progress:
             path = output_folder(out, loaded.name) / LOG
             result = fly_to_log(assembly, path, force=force, progress=progress)
-    _finish(result, plot_it, video, as_json, traceback)
+    pictures = Pictures(plot_it, video, report_it)
+    _finish(result, pictures, as_json, traceback)
 
 
 def _run_all(overrides: list[str], out: Path, force: bool, as_json: bool) -> NoReturn:
@@ -103,6 +114,7 @@ def replay(
     force: Force = False,
     plot_it: Plot = False,
     video: Video = False,
+    report_it: Report = False,
     as_json: Json = False,
     trust: Trust = False,
     traceback: Traceback = False,
@@ -131,7 +143,8 @@ def replay(
                 progress=progress,
             )
     if not verify:
-        _finish(result, plot_it, video, as_json, traceback)
+        pictures = Pictures(plot_it, video, report_it)
+        _finish(result, pictures, as_json, traceback)
     elif as_json:
         print(json.dumps({"identical": difference is None, "difference": str(difference or "")}))
     else:
@@ -139,7 +152,7 @@ def replay(
     raise typer.Exit(1 if verify and difference else 0)
 
 
-def _finish(result: "Result", plot_it: bool, video: bool, as_json: bool, traceback: bool) -> None:
+def _finish(result: "Result", made: Pictures, as_json: bool, traceback: bool) -> None:
     """Print the verdict, make the requested pictures, and exit with the status."""
     from mjspace.runner import report
 
@@ -150,17 +163,22 @@ def _finish(result: "Result", plot_it: bool, video: bool, as_json: bool, traceba
     if not as_json:
         report.print_result(result)
         print(f"log    {result.path}")
-    if plot_it:
+    if made.plot:
         from mjspace.plotting.page import plot as to_plot
 
         pictures["plot"] = result.path.with_suffix(".png")
         to_plot(result.path, pictures["plot"])
-    if video:
+    if made.video:
         from mjspace.rendering.render import render as to_video
 
         pictures["video"] = result.path.with_suffix(".mp4")
         with progress_bar(result.log.end, "rendering") as progress:
             to_video(result.path, pictures["video"], progress=progress)
+    if made.report:
+        from mjspace.runner.flight_report import write as to_report
+
+        pictures["report"] = result.path.with_suffix(".html")
+        to_report([result.path], pictures["report"])
     if as_json:
         shown = {name: str(path) for name, path in pictures.items()}
         print(json.dumps(report.result_data(result) | shown, indent=2))

@@ -22,12 +22,16 @@ def print_result(result: Result) -> None:
     console = Console()
     if result.verdicts:
         table = Table(box=None, pad_edge=False, header_style="bold")
+        has_requirements = any(verdict.check.requirement for verdict in result.verdicts)
+        if has_requirements:
+            table.add_column("requirement")
         table.add_column("check")
         table.add_column("measured", justify="right")
         table.add_column("required")
         table.add_column("verdict")
         for verdict in result.verdicts:
             table.add_row(
+                *[_shown(verdict.check.requirement)] * has_requirements,
                 _shown(verdict.check.name),
                 "-" if verdict.missing else f"{verdict.measured:.4g}",
                 verdict.bound,
@@ -62,6 +66,7 @@ def result_data(result: Result) -> dict[str, Any]:
         "checks": [
             {
                 "name": verdict.check.name,
+                "requirement": verdict.check.requirement,
                 "signal": verdict.check.signal,
                 "statistic": verdict.check.statistic,
                 "measured": None if verdict.missing else verdict.measured,

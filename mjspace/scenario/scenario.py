@@ -84,6 +84,9 @@ class Check(SignalRegion):
     """How the check comes out when all is well: FAIL of what the flight shows not to hold. The
     scenario passes if it reaches its end and every check comes out as expected; a check without a
     sample in its window comes out neither way."""
+    requirement: str = ""
+    """Identifier of the requirement that it verifies, as ``"ADCS-012"``: of a specification, shown
+    with the verdict."""
     because: str = ""
     """Why it fails, in one line: required with ``expected = "FAIL"``."""
     fails_with: list[str] = []

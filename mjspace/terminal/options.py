@@ -17,6 +17,9 @@ Out = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace a log that is there already.")]
 Plot = Annotated[bool, typer.Option("--plot", help="Also plot the log: flight.png.")]
+Report = Annotated[
+    bool, typer.Option("--report", help="Also write a report of the log: flight.html.")
+]
 Traceback = Annotated[
     bool, typer.Option("--traceback", help="Show what your own code raised in full.")
 ]

@@ -12,8 +12,9 @@ from mjspace.campaign import campaign as campaigns
 from mjspace.campaign import report
 from mjspace.campaign.flights import Call, Flown, fly_members, log_of, together
 from mjspace.campaign.members import Campaign, population, require_arrival
+from mjspace.campaign.results import WALL_TIME
 from mjspace.campaign.statistics import Gate
-from mjspace.campaign.store import WALL_TIME, Store
+from mjspace.campaign.store import Store
 from mjspace.errors import FlightError, InputError
 from mjspace.log.reader import Log
 

@@ -16,6 +16,7 @@ from mjspace.runner.run import run
 COMMANDS = {
     "info": (),
     "plot": ("-o", "out.png"),
+    "report": ("-o", "out.html"),
     "render": ("-o", "out.png"),
     "replay": ("--out", "out"),
 }
@@ -52,6 +53,7 @@ def assert_refused(command: Command, path: str, message: str) -> None:
         assert message in said, name
         assert said.count("\n") == 1, said
         assert not os.path.exists("out.png")
+        assert not os.path.exists("out.html")
         assert not os.path.exists("out")
 
 

@@ -15,13 +15,20 @@ COMMANDS = {
     "verify": ("replay", "x.mcap", "--verify"),
     "replay": ("replay", "x.mcap", "--out", "out"),
     "plot": ("plot", "x.mcap", "-o", "x.png"),
+    "report": ("report", "x.mcap", "-o", "x.html"),
     "render": ("render", "x.mcap", "-o", "y.png"),
 }
-WRITES = {"recover": "good.mcap", "replay": "out", "plot": "x.png", "render": "y.png"}
+WRITES = {
+    "recover": "good.mcap",
+    "replay": "out",
+    "plot": "x.png",
+    "report": "x.html",
+    "render": "y.png",
+}
 """What a command may leave behind, where it succeeds."""
 LITTLE = ("info", "recover", "verify")
 """Commands that are always tried; one of the others is by chance, for its time."""
-OTHERS = (*("json",) * 3, *("replay",) * 4, "plot", "render")
+OTHERS = (*("json",) * 3, *("replay",) * 4, "plot", "report", "render")
 
 
 def attack(case: Case, folder: Path, commands: Commands, *, every: bool) -> Iterator[str]:

@@ -102,6 +102,20 @@ def test_the_table_says_what_was_expected_and_why(
     assert "not measured later: event 'at rest' never happened" in shown
 
 
+def test_the_requirement_that_a_check_verifies_is_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    named = FAST.format(above=0.4) + 'requirement = "ADCS-012"\n'
+    for out, words, has in (("a", SCENARIO + named, True), ("b", SCENARIO, False)):
+        (tmp_path / "x.toml").write_text(words)
+        run_it = ("run", tmp_path / "x.toml", "--out", tmp_path / out)
+        assert mjspace(*run_it, monkeypatch=monkeypatch) == 0
+        shown = " ".join(capsys.readouterr().out.split())
+        assert shown.startswith("requirement check" if has else "check measured")
+        assert ("ADCS-012 fast 0.4387 > 0.4 PASS" in shown) is has
+    assert scenario_of(Log(tmp_path / "a" / "flight.mcap")).checks[1].requirement == "ADCS-012"
+
+
 def test_a_flight_that_ends_early_fails_whatever_its_checks(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

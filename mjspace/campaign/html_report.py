@@ -1,0 +1,130 @@
+"""The report of a campaign as one HTML file: its answer with histograms, correlations, scatter."""
+
+import json
+import os
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+
+from mjspace.campaign.report import Answer, CheckFigures
+from mjspace.campaign.results import DESCRIPTION, JudgedResults
+from mjspace.contract import Array
+from mjspace.reporting import page
+from mjspace.reporting.charts import Bound, Chart, Series
+from mjspace.scenario.dispersions import Dispersion
+from mjspace.scenario.scenario import Check
+
+_BINS = 40  # at most
+_DRAWS = 12  # of a tornado
+_POINTS = 5000  # of a scatter
+FAILED, SUCCEEDED = 0, 1
+"""Colors of the page: red and green."""
+
+
+def write(results: JudgedResults, found: Answer, output: Path) -> None:
+    """Write what the members of a campaign show to one HTML file, which needs no network.
+
+    Logs are linked by their place relative to it.
+
+    Raises:
+        ValueError: ``output`` does not end in .html.
+        OSError: a file cannot be read or written.
+    """
+    page.require_html(output)
+    charts = [
+        _histogram(results.column(f"{name}: measured"), check, figures)
+        for (name, check), figures in zip(results.checks.items(), found.checks, strict=True)
+    ]
+    description = json.loads((results.folder / DESCRIPTION).read_text(encoding="utf-8"))
+    software = description.get("software")
+    page.write(
+        output,
+        "campaign.html.j2",
+        [*_scatter(results, found), *charts],
+        title=f"{results.scenario.name}: campaign",
+        scenario=results.scenario,
+        found=found,
+        checks=list(zip(results.checks.values(), found.checks, strict=True)),
+        tornados=[(figures, _tornado(figures)) for figures in found.checks],
+        worst=[(each, _link(Path(each.log), output) if each.log else "") for each in found.worst],
+        dispersions=[_parameters(dispersion) for dispersion in results.scenario.dispersions],
+        software=software if isinstance(software, dict) else {},
+        draws=results.draws,
+        toml=str(description["scenario"]),
+    )
+
+
+def _histogram(measured: Array, check: Check, figures: CheckFigures) -> Chart:
+    """Return how the measured values are distributed, with the bounds."""
+    values = measured[np.isfinite(measured)]
+    # Values that are equal but for the last digits have no bins of their own.
+    if len(values) and np.ptp(values) <= 1e-9 * np.abs(values).max():
+        values = np.full_like(values, values[0])
+    few = min(_BINS, max(1, len(np.histogram_bin_edges(values, "auto")) - 1)) if len(values) else 1
+    counts, edges = np.histogram(values, bins=few)
+    bounds = [
+        Bound(f"{sign} {bound:.4g}", (float(bound), 0.0), (float(bound), np.inf))
+        for sign, bound in (("<", check.below), (">", check.above))
+        if bound is not None
+    ]
+    centers = 0.5 * (edges[:-1] + edges[1:])
+    series = Series("members", centers, counts.astype(float), None)
+    what = f"measured: {check.statistic} of {check.signal}"
+    return Chart(
+        f"{figures.name} {figures.bound}", "members", [series], "bars", what, bounds=bounds
+    )
+
+
+def _tornado(figures: CheckFigures) -> list[tuple[str, float]]:
+    """Return the draws on which a check depends, the strongest first."""
+    known = [(draw, value) for draw, value in figures.correlations.items() if value is not None]
+    return sorted(known, key=lambda each: -abs(each[1]))[:_DRAWS]
+
+
+def _scatter(results: JudgedResults, found: Answer) -> list[Chart]:
+    """Return the members over the two draws on which any check depends most; none of fewer."""
+
+    def weight(draw: str) -> float:
+        return max((abs(check.correlations[draw] or 0.0) for check in found.checks), default=0.0)
+
+    first = sorted(results.draws, key=weight, reverse=True)[:2]
+    if len(first) < 2:
+        return []
+    x, y = (results.column(draw) for draw in first)
+    passed = results.column("passed") > 0.5
+    series = [
+        _points(name, x[chosen], y[chosen], color)
+        for name, chosen, color in (
+            ("succeeded", passed, SUCCEEDED),
+            ("failed", ~passed, FAILED),
+        )
+        if chosen.any()
+    ]
+    return [
+        Chart("Members over the two draws that matter most", first[1], series, "points", first[0])
+    ]
+
+
+def _points(name: str, x: Array, y: Array, color: int) -> Series:
+    """Return the points in the order of ``x``: of very many, some that are evenly chosen."""
+    every = -(-len(x) // _POINTS)
+    x, y = x[::every], y[::every]
+    order = np.argsort(x, kind="stable")
+    shown = name if every == 1 else f"{name}, one of {every}"
+    return Series(shown, x[order], y[order], color)
+
+
+def _link(log: Path, output: Path) -> str:
+    """Return the address of a log from the page."""
+    return quote(Path(os.path.relpath(log.absolute(), output.absolute().parent)).as_posix())
+
+
+def _parameters(dispersion: Dispersion) -> tuple[str, str, str]:
+    """Return the key, the distribution and its parameters."""
+    table = dispersion.model_dump(exclude_none=True, exclude={"key", "distribution"})
+    words = (
+        f"{key} {', '.join(f'{x:.6g}' for x in (value if isinstance(value, list) else [value]))}"
+        for key, value in table.items()
+    )
+    return dispersion.key, dispersion.distribution, "; ".join(words)

@@ -1,0 +1,1 @@
+"""Reports: one HTML file each, with interactive plots, which opens without a network."""

@@ -1,0 +1,76 @@
+"""A page from its template: escaped throughout, with its style, script and pictures inside."""
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from mjspace.errors import printable, whole_or_none
+from mjspace.reporting.charts import Chart, data
+
+
+def write(output: Path, template: str, charts: Sequence[Chart], **content: Any) -> None:
+    """Write a page of ``content`` and ``charts`` to ``output``, in place of what is there.
+
+    Every text is escaped, and shown without control characters. A policy in the page lets a
+    browser run no other script than its own two, and load nothing.
+
+    Raises:
+        ValueError: ``output`` does not end in .html.
+        OSError: the file cannot be written.
+    """
+    require_html(output)
+    environment = Environment(
+        loader=PackageLoader("mjspace.reporting"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=_shown,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    scripts = [_part("uplot/uPlot.iife.min.js"), _part("templates/page.js")]
+    hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
+    text = environment.get_template(template).render(
+        content
+        | {
+            "policy": f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; "
+            "img-src data:; media-src data:",
+            "styles": [Markup(_part(f)) for f in ("uplot/uPlot.min.css", "templates/page.css")],
+            "scripts": [Markup(script) for script in scripts],
+            "license": _part("uplot/LICENSE"),
+            "charts": data(charts),
+        }
+    )
+    with whole_or_none(output) as file:
+        file.write(text.encode(errors="backslashreplace"))
+
+
+def require_html(output: Path) -> None:
+    """Refuse a file of another ending, before anything is computed.
+
+    Raises:
+        ValueError: it does not end in .html.
+    """
+    if output.suffix != ".html":
+        raise ValueError(f"output {str(output)!r}: end it in .html")
+
+
+def _shown(value: Any) -> Any:
+    """Return what an expression of a template prints."""
+    return printable(value) if type(value) is str else value
+
+
+@cache
+def _part(name: str) -> str:
+    """Return a file of this room."""
+    return (resources.files("mjspace.reporting") / name).read_text(encoding="utf-8").strip()
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
