@@ -14,6 +14,7 @@ from mjspace.terminal.options import (
     LogFile,
     Out,
     Plot,
+    Scenario,
     Set,
     Traceback,
     Trust,
@@ -26,9 +27,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")
-    ] = "",
+    scenario: Scenario = "",
     every: Annotated[
         bool, typer.Option("--all", help="Every scenario that comes with mjspace, on all cores.")
     ] = False,

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 import typer
 
 from mjspace.errors import InputError, printable
-from mjspace.terminal.options import Json, Set, Traceback, Trust
+from mjspace.terminal.options import Json, Scenario, Set, Traceback, Trust, Workers
 from mjspace.terminal.reporting import cause_shown, count_bar
 
 
 def falsify(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    scenario: Scenario,
     count: Annotated[int, typer.Option("--n", help="Flights at most.")] = 200,
     overrides: Set = [],  # noqa: B006
     seed: Annotated[int | None, typer.Option(help="Seed of the search and every sensor.")] = None,
@@ -29,9 +29,7 @@ def falsify(
             "left out.",
         ),
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
-    ] = None,
+    workers: Workers = None,
     as_json: Json = False,
     trust: Trust = False,
     traceback: Traceback = False,
@@ -115,7 +113,7 @@ def _number(value: Any) -> str:
 
 
 def tune(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    scenario: Scenario,
     vary: Annotated[
         list[str],
         typer.Option(
@@ -144,9 +142,7 @@ def tune(
         Path | None,
         typer.Option("--out", help="Folder of the tuned scenario; runs/<scenario>/tuned else."),
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
-    ] = None,
+    workers: Workers = None,
     as_json: Json = False,
     trust: Trust = False,
     traceback: Traceback = False,
