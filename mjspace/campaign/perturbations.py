@@ -141,7 +141,7 @@ class Sampling(Perturbation):
         return table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Noise(Perturbation):
     """A quantity is measured with white noise."""
 
@@ -180,8 +180,8 @@ KINDS: dict[str, Perturbation] = {
     "inertia-up": Inertia("the law's inertia increased to"),
     "inertia-down": Inertia("the law's inertia reduced to", divides=True),
     "sampling": Sampling(),
-    "rate-noise": Noise("noise of the rate", "rad/s", "rate"),
-    "attitude-noise": Noise("noise of the attitude", "rad", "attitude"),
+    "rate-noise": Noise(name="noise of the rate", unit="rad/s", quantity="rate"),
+    "attitude-noise": Noise(name="noise of the attitude", unit="rad", quantity="attitude"),
 }
 """By the name on the command line: a line registers each."""
 

@@ -53,7 +53,10 @@ class Si(Unit):
                 inner(to_si(meant, self.si))
             except ValueError:
                 raise error from None
-            wrong = error.errors()[0]["msg"].replace("Input should", "should")
+            detail = error.errors()[0]
+            if isinstance(cause := detail.get("ctx", {}).get("error"), ValueError):
+                raise cause from None  # which says what was given
+            wrong = detail["msg"].replace("Input should", "should")
             raise ValueError(f"got {value:g} {self.si}, {wrong}: did you mean {meant!r}?") from None
 
     def __get_pydantic_json_schema__(
