@@ -100,7 +100,7 @@ def test_bad_input_is_one_line_that_names_it(flown: Path, tmp_path: Path) -> Non
         (lambda: mjspace.run("detumble-wheel"), "did you mean.*detumble-wheels"),
         (lambda: mjspace.replay("none.mcap", tmp_path), "log: .*none.mcap"),
         (lambda: mjspace.replay(flown, flown.parent), "holds the log that is to be flown again"),
-        (lambda: mjspace.plot(flown, "x.pdf"), r"end it in \.png"),
+        (lambda: mjspace.plot(flown, "x.jpg"), r"end it in \.png"),
         (lambda: mjspace.figure(flown, ["truth.rates"]), "truth.rate"),
     ):
         with pytest.raises(ValueError, match=message) as raised:

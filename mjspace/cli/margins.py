@@ -49,6 +49,8 @@ def margins(
         raise InputError(f"--tolerance {tolerance:g}: should be between 0 and 1")
     if output is not None and output.suffix != ".png":
         raise InputError(f"--output {output}: end it in .png")
+    if output is not None and not output.absolute().parent.is_dir():
+        raise InputError(f"--output {output}: there is no folder {output.parent}")
     what = Question(scenario, tuple(overrides), tuple(require), tolerance, trust)
     with cause_shown(traceback), count_bar(len(only or KINDS), "flying") as told:
         found = find(what, only, processes=workers, told=told)

@@ -35,17 +35,18 @@ def falsify(
     traceback: Traceback = False,
 ) -> None:
     """Search a scenario's dispersions for a flight that fails, and make it minimal."""
-    from mjspace.campaign.campaign import folder_of
     from mjspace.campaign.falsify import falsify as search
     from mjspace.campaign.falsify import nominal_draws, write
     from mjspace.campaign.members import Campaign, population
     from mjspace.runner.output import LOG, refuse_existing
+    from mjspace.runner.run import output_folder
 
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
     what = Campaign(scenario, tuple(overrides), count, seed, trust)
     members = population(what)
-    folder = out or folder_of(what, None).parent / f"counterexample-seed-{members.scenario.seed}"
+    last = f"counterexample-seed-{members.scenario.seed}"
+    folder = output_folder(out, members.scenario.name, last)
     refuse_existing(folder / LOG, force=False)
     with cause_shown(traceback), count_bar(count, "flying") as told:
         found = search(what, go_on=go_on, processes=workers, told=told)
@@ -148,20 +149,20 @@ def tune(
     traceback: Traceback = False,
 ) -> None:
     """Tune gains on several draws of the dispersions, and compare on others."""
-    from mjspace.campaign.campaign import folder_of
-    from mjspace.campaign.members import Campaign
+    from mjspace.campaign.members import Campaign, population
     from mjspace.campaign.tune import Goal, varied, write
     from mjspace.campaign.tune import tune as search
     from mjspace.campaign.written import SCENARIO
+    from mjspace.runner.run import output_folder
 
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
+    chosen, goal = [varied(text) for text in vary], Goal(minimized, tuple(require))
+    goal.checks()  # refuses what is none, before anything flies
     what = Campaign(scenario, tuple(overrides), count, seed, trust)
-    goal = Goal(minimized, tuple(require))
-    folder = out or folder_of(what, None).parent / "tuned"
+    folder = output_folder(out, population(what, alike=True).scenario.name, "tuned")
     if (folder / SCENARIO).exists():
         raise InputError(f"{folder / SCENARIO}: is there already: give another folder by --out")
-    chosen = [varied(text) for text in vary]
     with cause_shown(traceback), count_bar(count * draws, "flying") as told:
         found = search(what, chosen, goal, draws=draws, fresh=fresh, processes=workers, told=told)
     path = write(what, found.values, folder)

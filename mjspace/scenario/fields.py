@@ -53,10 +53,7 @@ class Si(Unit):
                 inner(to_si(meant, self.si))
             except ValueError:
                 raise error from None
-            detail = error.errors()[0]
-            if isinstance(cause := detail.get("ctx", {}).get("error"), ValueError):
-                raise cause from None  # which says what was given
-            wrong = detail["msg"].replace("Input should", "should")
+            wrong = error.errors()[0]["msg"].replace("Input should", "should")
             raise ValueError(f"got {value:g} {self.si}, {wrong}: did you mean {meant!r}?") from None
 
     def __get_pydantic_json_schema__(
@@ -117,7 +114,10 @@ class OneOrEach:
         try:
             return inner([value])[0]
         except ValidationError as error:
-            wrong = error.errors()[0]["msg"].replace("Input should", "should")
+            detail = error.errors()[0]
+            if isinstance(cause := detail.get("ctx", {}).get("error"), ValueError):
+                raise cause from None  # which says what was given
+            wrong = detail["msg"].replace("Input should", "should")
             raise ValueError(f"got {shortened(repr(value))}, {wrong}") from None
 
 

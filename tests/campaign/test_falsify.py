@@ -89,6 +89,8 @@ def test_the_same_seed_finds_the_same_and_a_search_goes_on_if_asked(tmp_path: Pa
 def test_a_scenario_that_fails_as_it_is_or_has_no_dispersions_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="fails as it is: FAIL rate"):
         falsify(Campaign(written(tmp_path, SCENARIO), ("law.rate_gain=41",), 10, 1), processes=1)
+    with pytest.raises(InputError, match="no checks"):
+        falsify(Campaign(written(tmp_path, SCENARIO), ("checks=[]",), 10, 1))
     with pytest.raises(InputError, match="there is nothing to search"):
         falsify(Campaign("wheel-failure", (), 10, 1))
 

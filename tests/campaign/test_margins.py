@@ -134,6 +134,9 @@ def test_a_requirement_that_is_none_is_one_line(text: str, says: str) -> None:
         (["--require", "max(truth.rte) < 1"], "truth.rte"),
         (["--require", "final(truth.rate) > 1 rad/s"], "fails as it is"),
         (["-o", "x.jpg"], "end it in .png"),
+        (["-o", "missing/x.png"], "there is no folder missing"),
+        (["--require", "max(truth.rate) < 1 m"], "checks.0.below: got 1 m for truth.rate"),
+        (["--require", "max(truth.rate) < nan"], "should be a finite number"),
         ([], "no checks"),
     ],
 )

@@ -73,6 +73,10 @@ def test_bounds_are_in_si_and_their_logarithm_is_covered() -> None:
         (["--vary", "checks=1..2"], "is no part of the flight"),
         (["--vary", "plant.gyrostat_inertia[0][0]=1..2"], "it is dispersed"),
         (["--vary", "law.rate_gain=1..2", "--minimize", "rms(rate)"], "rate"),
+        (["--vary", "law.rate_gain=1..2", "--vary", "law.rate_gain=3..4"], "is given twice"),
+        (["--vary", "law.rate_gain=1 m..2 m"], "should be N m s/rad"),
+        (["--vary", "law.rate_gain=1 m..2 s"], "both bounds should be of one dimension"),
+        (["--vary", "initial.rate=1..2"], "initial.rate is [0.01, 0.0, 0.0], should be a number"),
         (["--vary", "law.rate_gain=1..2", "--minimize", "truth.rate"], "should be as 'rms("),
     ],
 )
@@ -93,6 +97,16 @@ def test_a_value_that_is_dispersed_too_is_refused(tmp_path: Path) -> None:
     what = [Varied("plant.gyrostat_inertia[0][0]", 1.0, 2.0)]
     with pytest.raises(InputError, match="it is dispersed"):
         tune(Campaign(path, (), 3, 1), what, GOAL, draws=1, fresh=1)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_scenario_without_dispersions_has_a_folder_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    options = ["--vary", "law.rate_gain=5..6", "--minimize", "rms(truth.rate)", "--n", "1"]
+    assert command_line("tune", written(tmp_path), *options) == 0
+    assert load(tmp_path / "runs" / "one_axis" / "tuned" / "scenario.toml")
 
 
 @pytest.mark.slow

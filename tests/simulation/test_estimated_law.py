@@ -252,7 +252,7 @@ Law.step = step
 
 def test_what_cannot_fly_on_estimates_is_refused(tmp_path: Path) -> None:
     path = scenario(tmp_path)
-    with pytest.raises(InputError, match="estimator: the inner loop of phase_plane:Schmitt"):
+    with pytest.raises(InputError, match="estimator: the inner loop of Schmitt"):
         assemble(*load("rcs-schmitt", ["estimator.kind=mekf:MEKF", *MEKF]))
     for kind in ("own.so:law", "tcp://localhost:1"):
         with pytest.raises(InputError, match="estimator: a law in a shared library"):
