@@ -61,9 +61,9 @@ COLUMNS = {
 
 PAGE = """# Margins
 
-How much worse may it become before a law fails? `mjspace margins` makes a scenario worse in one way
-at a time and flies it on the real plant. It doubles what it changed until a flight fails, and
-bisects:
+How much delay, gain error or noise may there be before a law fails? `mjspace margins` changes a
+scenario in one way at a time and flies it on the whole plant. It doubles the change until a flight
+fails, then bisects between the last success and the first failure:
 
 ```console
 $ mjspace margins lqr-regulation --only delay --require "final(truth.attitude_error) < 1 deg"
@@ -73,7 +73,7 @@ $ mjspace margins lqr-regulation --only delay --require "final(truth.attitude_er
 {example}
 ```
 
-| `--only` | what becomes worse |
+| `--only` | what is changed |
 |---|---|
 | `delay` | all actuators apply what they should have applied earlier |
 | `gain-up`, `gain-down` | all actuators apply a multiple of what they should: up to 32, or 1/32 |
@@ -83,22 +83,21 @@ $ mjspace margins lqr-regulation --only delay --require "final(truth.attitude_er
 
 What has to hold are the scenario's own checks or, instead, `--require "STATISTIC(SIGNAL) < VALUE
 from TIME"`, repeatable, with `>` too and the [statistics of checks](scenario.md). A margin is known
-to 5 % (`--tolerance`), a delay and a control period to one step. What failed is the least of those
-flown: nothing was tried between the two values, and less may fail where the plant is no simple one.
+to 5 % (`--tolerance`), a delay and a control period to one step. Bisection supposes that whatever
+is worse than a failure fails too; a smaller change that fails between two that do not is not found.
 `--json` has every flight, and `-o margins.png` draws them.
 
 ## The attitude laws on one slew
 
 A satellite of 10, 12 and 14 kg m^2 with three wheels without limits turns by 60 deg in 20 s and
-holds for 20 s, at 50 Hz. Near the end of the slew, with what each law knows or assumes, the error e
-obeys e'' + 2 e' + e = 0, in seconds: all have one bandwidth. Required is an attitude error below
-1 deg from 30 s on. Written by `python tools/margins_page.py docs/margins.md` in a quarter of an
-hour.
+holds for 20 s, at 50 Hz. The gains are such that under each law a small error e obeys
+e'' + 2 e' + e = 0, in seconds: all have one bandwidth. Required is an attitude error below 1 deg
+from 30 s on. Written by `python tools/margins_page.py docs/margins.md` in a quarter of an hour.
 
 {table}
 
-The factors of the gain are of what the wheels apply, those of the inertia of what the law believes;
-`-` where it has no such gain. With `<` and `>` all was survived that was tried.
+Factors of the gain multiply what the wheels apply, those of the inertia the law's inertia; `-`
+where the law has no such gain. With `<` and `>` nothing that was tried failed.
 
 {remarks}
 """

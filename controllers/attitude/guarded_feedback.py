@@ -2,10 +2,10 @@
 
 The rate is the median of three gyros, component by component: whatever one of them reports, it is
 between those of the two others. The attitude follows the rate, and is drawn to the star tracker's
-where that is valid: a complementary filter on the group of rotations (R. Mahony, T. Hamel and J.-M.
-Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEEE Transactions on
-Automatic Control 53, 2008, equation 11, as a passive filter without a bias, in discrete time). The
-feedback is ``quaternion_feedback:Switched``. All arrays may have leading vehicle axes.
+where that is valid: the passive complementary filter, without its estimate of a bias, in discrete
+time (R. Mahony, T. Hamel and J.-M. Pflimlin, "Nonlinear complementary filters on the special
+orthogonal group", IEEE Transactions on Automatic Control 53, 2008). The feedback is
+``quaternion_feedback:Switched``. All arrays may have leading vehicle axes.
 """
 
 from dataclasses import dataclass

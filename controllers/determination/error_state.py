@@ -7,7 +7,7 @@ from_rotation_vector(error).
 import numpy as np
 
 from mjspace.algebra import dot, times
-from mjspace.attitude import conjugate, from_rotation_vector, multiply, rotate, to_rotation_vector
+from mjspace.attitude import conjugate, from_rotation_vector, multiply, to_rotation_vector
 from mjspace.contract import Array
 
 
@@ -25,11 +25,6 @@ def mean_rate(last: Array, now: Array, bias: Array) -> Array:
 def turned(attitude: Array, rate: Array, h: Array) -> Array:
     """Return the ``attitude`` (..., 4) after ``h`` [s] (..., 1) at a constant body ``rate``."""
     return multiply(attitude, from_rotation_vector(h * rate))
-
-
-def seen_from(attitude: Array, inertial: Array) -> Array:
-    """Return the body components of a vector (..., 3) with ``inertial`` components."""
-    return rotate(conjugate(attitude), inertial)
 
 
 def corrected(

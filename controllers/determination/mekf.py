@@ -12,10 +12,10 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from mjspace.algebra import cross_matrix, dot, matrix_product, transpose
-from mjspace.attitude import from_rotation_vector, normalize, to_matrix
+from mjspace.attitude import conjugate, from_rotation_vector, normalize, rotate, to_matrix
 from mjspace.contract import Array, Gains, Measurement, Unit, gain
 
-from .error_state import attitude_error, corrected, mean_rate, seen_from, turned
+from .error_state import attitude_error, corrected, mean_rate, turned
 from .samples import is_new, is_sample
 from .vector_observations import covariance, q_method
 
@@ -159,7 +159,7 @@ class MEKF(Gains):
         for quantity, inertial, noise in self._vectors(measurement):
             sample = getattr(measurement, quantity)
             fresh = is_new(quantity, measurement, last[..., begin : begin + 3])
-            expected = seen_from(q, inertial)
+            expected = rotate(conjugate(q), inertial)
             # A rotation theta changes R^T r by expected x theta.
             H[..., ATTITUDE] = cross_matrix(expected)
             x, P, square = corrected(x, P, H, sample - expected, noise, fresh)

@@ -1,10 +1,9 @@
 """Hazards of a landing site in a map of heights: slope and roughness of each footprint.
 
 A plane is fitted by least squares to the heights within a footprint; its steepness is the slope,
-the largest distance of those heights from it the roughness. The two measures and the choice of the
-nearest site that keeps both are those of hazard detection by lidar: A. E. Johnson, A. R. Klumpp,
-J. B. Collier and A. A. Wolf, "Lidar-based hazard avoidance for safe landing on Mars", J. Guidance,
-Control, and Dynamics 25 (2002) 1091-1099.
+the largest distance of those heights from it the roughness. Sites are judged by these two in
+A. E. Johnson, A. R. Klumpp, J. B. Collier and A. A. Wolf, "Lidar-based hazard avoidance for safe
+landing on Mars", Journal of Guidance, Control, and Dynamics 25 (2002).
 """
 
 from functools import partial
@@ -93,8 +92,10 @@ def nearest_safe(
     distance = np.where(fit, np.hypot(x - here[0], y - here[1]), np.inf)
     best = np.unravel_index(np.argmin(distance), distance.shape)
     if distance[best] > reach:
+        beyond = f"the nearest that does is {distance[best]:.4g} m away"
+        none = "none on the map does"
         raise ValueError(
-            f"reach: no site within {reach:g} m of {planned} m keeps the limits; the nearest that "
-            f"does is {distance[best]:.4g} m away"
+            f"reach: no site within {reach:g} m of {planned} m keeps the limits; "
+            f"{none if np.isinf(distance[best]) else beyond}"
         )
     return Sites(here, np.array([x[best], y[best], heights[best]]))

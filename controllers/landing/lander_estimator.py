@@ -4,15 +4,14 @@ Measured position, velocity and attitude are read once, as the last fix before t
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from mjspace.contract import Array, Measurement, Trajectory
+from mjspace.contract import Array, Measurement
 
 from . import lander, lander_vectoring, powered_descent
 from .lander_filter import FilterState, Navigation
-from .landing_site import SiteReference
 
 
 class Estimates(NamedTuple):
@@ -42,71 +41,50 @@ DescentState = _joined("DescentState", powered_descent.State, FilterState)
 DescentSignals = _joined("DescentSignals", powered_descent.Signals, Estimates)
 
 
+class _OnEstimates:
+    """The filter of ``Navigation`` before a law: both are bases beside this one, the law first."""
+
+    kinds: ClassVar[tuple[Any, Any, Any]]
+    """Of the law's state, and of state and signals with those of the filter."""
+
+    def reset(self, measurement: Measurement, reference: Any) -> Any:
+        """Return the law's initial state and the initial estimates."""
+        this: Any = self
+        own: Any = super()
+        return self.kinds[1](*own.reset(measurement, reference), *this.fix(measurement))
+
+    def step(
+        self, state: Any, time: float, measurement: Measurement, reference: Any
+    ) -> tuple[Any, Any, Any]:
+        """Return the next state, the command, and the signals of law and filter."""
+        this: Any = self
+        of_law, joined_state, joined_signals = self.kinds
+        first = len(state) - len(FilterState._fields)
+        estimate: FilterState = this.navigate(FilterState(*state[first:]), measurement)
+        seen = this.estimated(estimate, measurement)
+        own: Any = super()
+        after, command, signals = own.step(of_law(*state[:first]), time, seen, reference)
+        variance = np.diagonal(estimate.covariance, axis1=-2, axis2=-1)[..., :9]
+        estimates = Estimates(*estimate[:3], np.sqrt(variance))
+        return joined_state(*after, *estimate), command, joined_signals(*signals, *estimates)
+
+
 @dataclass(frozen=True, kw_only=True)
-class EstimatedStructure(lander.VariableStructure, Navigation):
+class EstimatedStructure(_OnEstimates, lander.VariableStructure, Navigation):
     """``lander.VariableStructure`` on estimates."""
 
-    def reset(self, measurement: Measurement, reference: Trajectory) -> Any:
-        """Return the law's initial state and the initial estimates."""
-        return StructureState(*super().reset(measurement, reference), *self.fix(measurement))
-
-    def step(
-        self, state: Any, time: float, measurement: Measurement, reference: Trajectory
-    ) -> tuple[Any, Any, Any]:
-        """Return the next state, the command, and the signals of law and filter."""
-        estimate, estimated = _navigated(self, state, measurement)
-        own = lander.State(*state[: -len(FilterState._fields)])
-        after, command, signals = super().step(own, time, estimated, reference)
-        joined = StructureSignals(*signals, *_estimates(estimate))
-        return StructureState(*after, *estimate), command, joined
+    kinds = lander.State, StructureState, StructureSignals
 
 
 @dataclass(frozen=True, kw_only=True)
-class EstimatedVectoring(lander_vectoring.ThrustVectoring, Navigation):
+class EstimatedVectoring(_OnEstimates, lander_vectoring.ThrustVectoring, Navigation):
     """``lander_vectoring.ThrustVectoring`` on estimates."""
 
-    def reset(self, measurement: Measurement, reference: Trajectory) -> Any:
-        """Return the law's initial state and the initial estimates."""
-        return VectoringState(*super().reset(measurement, reference), *self.fix(measurement))
-
-    def step(
-        self, state: Any, time: float, measurement: Measurement, reference: Trajectory
-    ) -> tuple[Any, Any, Any]:
-        """Return the next state, the command, and the signals of law and filter."""
-        estimate, estimated = _navigated(self, state, measurement)
-        own = lander_vectoring.State(*state[: -len(FilterState._fields)])
-        after, command, signals = super().step(own, time, estimated, reference)
-        joined = VectoringSignals(*signals, *_estimates(estimate))
-        return VectoringState(*after, *estimate), command, joined
+    kinds = lander_vectoring.State, VectoringState, VectoringSignals
 
 
 @dataclass(frozen=True, kw_only=True)
-class EstimatedDescent(powered_descent.PoweredDescent, Navigation):
+class EstimatedDescent(_OnEstimates, powered_descent.PoweredDescent, Navigation):
     """``powered_descent.PoweredDescent`` on estimates."""
 
-    def reset(self, measurement: Measurement, reference: Trajectory) -> Any:
-        """Return the law's initial state and the initial estimates."""
-        return DescentState(*super().reset(measurement, reference), *self.fix(measurement))
-
-    def step(  # type: ignore[override]
-        self, state: Any, time: float, measurement: Measurement, reference: SiteReference
-    ) -> tuple[Any, Any, Any]:
-        """Return the next state, the command, and the signals of law and filter."""
-        estimate, estimated = _navigated(self, state, measurement)
-        own = powered_descent.State(*state[: -len(FilterState._fields)])
-        after, command, signals = super().step(own, time, estimated, reference)
-        joined = DescentSignals(*signals, *_estimates(estimate))
-        return DescentState(*after, *estimate), command, joined
-
-
-def _navigated(
-    navigation: Navigation, state: Any, measurement: Measurement
-) -> tuple[FilterState, Measurement]:
-    """Return the filter's next state, and the measurement with its estimates."""
-    estimate = navigation.navigate(FilterState(*state[-len(FilterState._fields) :]), measurement)
-    return estimate, navigation.estimated(estimate, measurement)
-
-
-def _estimates(estimate: FilterState) -> Estimates:
-    variance = np.diagonal(estimate.covariance, axis1=-2, axis2=-1)[..., :9]
-    return Estimates(*estimate[:3], np.sqrt(variance))
+    kinds = powered_descent.State, DescentState, DescentSignals

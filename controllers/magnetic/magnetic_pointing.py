@@ -101,7 +101,7 @@ class MomentumBias(Gains):
     stiff. The coils are asked for -c_x w_e across a, which damps the nutation and, since the orbit
     turns roll into yaw, the error of both, for -k_x q_e there, and for -k_h (h - h_0) a, which
     takes the wheel back to its bias. M. J. Sidi, Spacecraft Dynamics and Control, Cambridge 1997,
-    section 8.4; for the coils K. T. Alfriend, Magnetic attitude control system for dual-spin
+    chapter 8; for the coils K. T. Alfriend, Magnetic attitude control system for dual-spin
     satellites, AIAA Journal 13, 1975.
     """
 

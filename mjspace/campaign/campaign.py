@@ -10,11 +10,11 @@ from mjspace.campaign import flights
 from mjspace.campaign.flights import Call, fly_members, log_of
 from mjspace.campaign.members import Campaign, population
 from mjspace.campaign.store import Store
-from mjspace.errors import InputError, is_file_name, shortened
+from mjspace.errors import InputError
 from mjspace.interrupts import on_signals
 from mjspace.runner import workers
 from mjspace.runner.output import refuse_existing
-from mjspace.runner.run import Progress, Result, fly_to_log
+from mjspace.runner.run import Progress, Result, fly_to_log, output_folder
 
 TOGETHER = 32
 """Members in a batch, and in a file."""
@@ -42,9 +42,7 @@ def folder_of(campaign: Campaign, out: Path | None) -> Path:
     if out is not None:
         return out
     scenario = population(campaign).scenario
-    if not is_file_name(scenario.name):
-        raise InputError(f"{shortened(scenario.name)!r} is no name of a folder: give one by --out")
-    return Path("runs") / scenario.name / f"campaign-seed-{scenario.seed}"
+    return output_folder(None, scenario.name, f"campaign-seed-{scenario.seed}")
 
 
 def fly(

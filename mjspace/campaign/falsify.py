@@ -77,6 +77,8 @@ def falsify(
     members = population(campaign)
     if not members.dispersions:
         raise InputError(f"{members.path}: dispersions: none, there is nothing to search")
+    if not members.scenario.checks:
+        raise InputError(f"{members.path}: no checks: write in [[checks]] what has to hold")
     own = nominal_draws(members)
     module = __name__
     with on_signals() as stop, workers.team(module, stop, processes) as make:

@@ -13,7 +13,7 @@ from mjspace.errors import FlightError, InputError, nearest
 from mjspace.interrupts import on_signals
 from mjspace.runner import workers
 from mjspace.scenario.loading import read, validated
-from mjspace.simulation.assembly import assemble
+from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import first_start
 
 Told = Callable[[int, int], None]
@@ -116,7 +116,7 @@ def find(
     chosen = [key for key in keys or KINDS if KINDS[key].applies(nominal)]
     if lacking := [key for key in keys if key not in chosen]:
         raise InputError(f"--only {lacking[0]}: {question.scenario} has nothing that it changes")
-    if why := _trouble(nominal, nominal.copy()):
+    if why := _failure(nominal.assembly):
         raise InputError(f"{question.scenario}: fails as it is: {why}")
     found: dict[int, Margin] = {}
     told(0, 0)
@@ -167,10 +167,19 @@ def _trouble(nominal: Nominal, table: dict[str, object]) -> str:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scenario = validated(table, str(nominal.path))
-            assembly = assemble(scenario, nominal.path.parent, trust=nominal.trust)
-            (verdicts,), trouble = judged(assembly, first_start(assembly, [0]), [0])
+            return _failure(assemble(scenario, nominal.path.parent, trust=nominal.trust))
     except (InputError, FlightError) as error:
         return f"could not be flown: {error}"
+
+
+def _failure(assembly: Assembly) -> str:
+    """Return what fails in a flight; empty if nothing does.
+
+    Raises:
+        InputError: a check is of a signal that there is not.
+        FlightError: it cannot begin.
+    """
+    (verdicts,), trouble = judged(assembly, first_start(assembly, [0]), [0])
     failed = next((each for each in verdicts if not each.as_expected), None)
     if failed is None or trouble:
         return trouble

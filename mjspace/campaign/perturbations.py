@@ -14,8 +14,6 @@ from mjspace.simulation.assembly import Assembly
 
 Change = dict[str, Any]
 """A scenario's table, to be changed."""
-_MOST_DELAY = 1000
-"""Held values: a fault remembers each."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +35,8 @@ class Nominal:
 class Perturbation(ABC):
     """One way of making a scenario worse, by steps: the larger the step, the worse."""
 
-    name: ClassVar[str]
-    unit: ClassVar[str] = ""
+    name: str
+    unit: str = ""
     """Of ``value``: SI, or "" for a factor."""
     whole: ClassVar[bool] = False
     """Whether only whole steps are possible."""
@@ -66,7 +64,7 @@ class Delay(Perturbation):
     name = "delay of all actuators"
     unit = "s"
     whole = True
-    most = _MOST_DELAY
+    most = 1000  # each held value is remembered
 
     def applies(self, nominal: Nominal) -> bool:
         """Return whether there are any."""
@@ -81,9 +79,22 @@ class Delay(Perturbation):
         return _with_faults(nominal, "delayed", self.value(nominal, step))
 
 
-class _Gain(Perturbation):
-    first = 0.05
-    most = 31.0  # 30 dB
+@dataclass(frozen=True)
+class _Factor(Perturbation):
+    """What is nominal is multiplied by 1 + step, or divided by it."""
+
+    name: str
+    divides: bool = False
+    first: ClassVar[float] = 0.05
+    most: ClassVar[float] = 31.0  # 30 dB
+
+    def value(self, nominal: Nominal, step: float) -> float:
+        """Return the factor."""
+        return 1.0 / (1.0 + step) if self.divides else 1.0 + step
+
+
+class Gain(_Factor):
+    """All actuators apply more, or less, than they should."""
 
     def applies(self, nominal: Nominal) -> bool:
         """Return whether there are any actuators."""
@@ -94,29 +105,8 @@ class _Gain(Perturbation):
         return _with_faults(nominal, "scaled", self.value(nominal, step))
 
 
-class GainIncrease(_Gain):
-    """All actuators apply more than they should."""
-
-    name = "gain increased to"
-
-    def value(self, nominal: Nominal, step: float) -> float:
-        """Return the factor."""
-        return 1.0 + step
-
-
-class GainReduction(_Gain):
-    """All actuators apply less than they should."""
-
-    name = "gain reduced to"
-
-    def value(self, nominal: Nominal, step: float) -> float:
-        """Return the factor."""
-        return 1.0 / (1.0 + step)
-
-
-class _Inertia(Perturbation):
-    first = 0.05
-    most = 31.0
+class Inertia(_Factor):
+    """The law believes in a larger, or a smaller, inertia than the vehicle's."""
 
     def applies(self, nominal: Nominal) -> bool:
         """Return whether the law has an inertia among its gains."""
@@ -128,26 +118,6 @@ class _Inertia(Perturbation):
         own = np.array(nominal.assembly.scenario.law.gains["inertia"])
         table["law"]["inertia"] = (self.value(nominal, step) * own).tolist()
         return table
-
-
-class InertiaOverestimated(_Inertia):
-    """The law believes in a larger inertia than the vehicle's."""
-
-    name = "the law's inertia increased to"
-
-    def value(self, nominal: Nominal, step: float) -> float:
-        """Return the factor."""
-        return 1.0 + step
-
-
-class InertiaUnderestimated(_Inertia):
-    """The law believes in a smaller inertia than the vehicle's."""
-
-    name = "the law's inertia reduced to"
-
-    def value(self, nominal: Nominal, step: float) -> float:
-        """Return the factor."""
-        return 1.0 / (1.0 + step)
 
 
 class Sampling(Perturbation):
@@ -171,8 +141,15 @@ class Sampling(Perturbation):
         return table
 
 
-class _Noise(Perturbation):
-    quantity: ClassVar[str]
+@dataclass(frozen=True, kw_only=True)
+class Noise(Perturbation):
+    """A quantity is measured with white noise."""
+
+    name: str
+    unit: str
+    quantity: str
+    first: ClassVar[float] = 1e-6
+    most: ClassVar[float] = 1.0
 
     def applies(self, nominal: Nominal) -> bool:
         """Return whether a sensor measures the quantity."""
@@ -196,35 +173,15 @@ class _Noise(Perturbation):
         return [name for name, one in sensors.items() if one.measures == self.quantity]
 
 
-class GyroNoise(_Noise):
-    """The rate is measured with white noise."""
-
-    name = "noise of the rate"
-    unit = "rad/s"
-    quantity = "rate"
-    first = 1e-6
-    most = 1.0
-
-
-class AttitudeNoise(_Noise):
-    """The attitude is measured with white noise."""
-
-    name = "noise of the attitude"
-    unit = "rad"
-    quantity = "attitude"
-    first = 1e-6
-    most = 1.0
-
-
 KINDS: dict[str, Perturbation] = {
     "delay": Delay(),
-    "gain-up": GainIncrease(),
-    "gain-down": GainReduction(),
-    "inertia-up": InertiaOverestimated(),
-    "inertia-down": InertiaUnderestimated(),
+    "gain-up": Gain("gain increased to"),
+    "gain-down": Gain("gain reduced to", divides=True),
+    "inertia-up": Inertia("the law's inertia increased to"),
+    "inertia-down": Inertia("the law's inertia reduced to", divides=True),
     "sampling": Sampling(),
-    "rate-noise": GyroNoise(),
-    "attitude-noise": AttitudeNoise(),
+    "rate-noise": Noise(name="noise of the rate", unit="rad/s", quantity="rate"),
+    "attitude-noise": Noise(name="noise of the attitude", unit="rad", quantity="attitude"),
 }
 """By the name on the command line: a line registers each."""
 

@@ -45,8 +45,8 @@ def requirement(text: str, option: str = "--require") -> Check:
     try:
         return Check.model_validate(table)
     except ValidationError as error:
-        problem = error.errors()[0]
-        raise InputError(f"{option} {text!r}: {problem['msg']}") from None
+        wrong = error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise InputError(f"{option} {text!r}: {wrong.replace('Input should', 'should')}") from None
 
 
 def _statistic(name: str, option: str, text: str) -> str:

@@ -40,6 +40,8 @@ class Varied:
     key: str
     low: float
     high: float
+    unit: str = ""
+    """SI, of a bound that is a quantity; "" where both are plain numbers."""
 
     @property
     def path(self) -> tuple[str, ...]:
@@ -51,6 +53,10 @@ class Varied:
         if self.low > 0.0:
             return float(self.low * (self.high / self.low) ** part)
         return float(self.low + part * (self.high - self.low))
+
+    def written(self, value: float) -> float | str:
+        """Return the value as the scenario reads it, which judges its unit."""
+        return f"{value!r} {self.unit}" if self.unit else value
 
 
 @dataclass(frozen=True)
@@ -106,11 +112,13 @@ def varied(text: str) -> Varied:
     with input_error_at(f"--vary {text}"):
         if found is None:
             raise ValueError("should be as 'law.rate_gain=1..100'")
-        low, high = (_number(each) for each in found.groups()[1:])
+        (low, unit), (high, other) = (_number(each) for each in found.groups()[1:])
+        if unit and other and unit != other:
+            raise ValueError(f"{unit} and {other}: both bounds should be of one dimension")
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ValueError(f"{low:g} should be less than {high:g}")
         path_of(found[1])
-    return Varied(found[1], low, high)
+    return Varied(found[1], low, high, unit or other)
 
 
 def tune(
@@ -134,13 +142,18 @@ def tune(
     """
     members = population(campaign, alike=True)
     draws = draws if members.dispersions else 1
-    own = {}
+    own: dict[str, Any] = {}
     for each in what:
+        if each.key in own:
+            raise InputError(f"--vary {each.key}: is given twice")
         with input_error_at("--vary"):
-            own[each.key] = value_at(members.written, each.path)
+            found = value_at(members.written, each.path)
+            if isinstance(found, bool) or not (found is None or isinstance(found, int | float)):
+                raise ValueError(f"{each.key} is {found!r}, should be a number")
+            own[each.key] = found
         if any(each.path == dispersion.path for dispersion in members.dispersions):
             raise InputError(f"--vary {each.key}: it is dispersed")
-    goal.checks()  # refuses what is none, before anything flies
+    members.with_values({each.path: each.written(each.low) for each in what}).member(0)
     trials: dict[tuple[float, ...], float] = {}
     with on_signals() as stop, workers.team(__name__, stop, processes) as make:
         flying = _Flying((campaign, members.identity, goal), make, told)
@@ -238,8 +251,10 @@ def write(campaign: Campaign, values: Mapping[str, float], folder: Path) -> Path
     return write_scenario(assembly, folder)
 
 
-def _number(text: str) -> float:
+def _number(text: str) -> tuple[float, str]:
+    """Return a number and its unit, "" without one; both SI."""
     try:
-        return float(text)
+        return float(text), ""
     except ValueError:
-        return float(to_si(text, None))
+        found = to_si(text, None)
+        return float(found), getattr(found, "unit", "")

@@ -16,8 +16,7 @@ def write_scenario(assembly: Assembly, folder: Path) -> Path:
         OSError: a file cannot be written.
     """
     scenario = assembly.scenario
-    components = (scenario.law.kind, scenario.reference.kind)
-    named = (*components, scenario.plant.model, scenario.environment.python or "")
+    named = (*scenario.kinds.values(), scenario.plant.model)
     make_folder(folder)
     for name, content in assembly.sources.items():
         top, inside, _ = name.partition("/")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mjspace.errors import InputError, printable
-from mjspace.terminal.options import Force, Json, Set, Traceback, Trust
+from mjspace.terminal.options import Force, Json, Scenario, Set, Traceback, Trust, Workers
 from mjspace.terminal.reporting import cause_shown, count_bar, progress_bar
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class Keep(StrEnum):
 
 
 def campaign(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    scenario: Scenario,
     count: Annotated[int, typer.Option("--n", help="Members: flights of the campaign.")] = 100,
     overrides: Set = [],  # noqa: B006
     seed: Annotated[int | None, typer.Option(help="Seed of every draw and sensor.")] = None,
@@ -45,9 +45,7 @@ def campaign(
     member: Annotated[
         int | None, typer.Option(help="Fly this member alone, into a log, and judge it.")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
-    ] = None,
+    workers: Workers = None,
     report_it: Annotated[
         bool, typer.Option("--report", help="Also write a report of the answer: report.html.")
     ] = False,

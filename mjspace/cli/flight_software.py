@@ -6,9 +6,7 @@ from typing import Annotated
 import typer
 
 from mjspace.errors import InputError, input_error_at, shortened, whole_or_none
-from mjspace.terminal.options import Set, Trust
-
-Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")]
+from mjspace.terminal.options import Scenario, Set, Trust
 
 
 def law_header(

@@ -15,6 +15,7 @@ from mjspace.terminal.options import (
     Out,
     Plot,
     Report,
+    Scenario,
     Set,
     Traceback,
     Trust,
@@ -35,9 +36,7 @@ class Pictures(NamedTuple):
 
 
 def run(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")
-    ] = "",
+    scenario: Scenario = "",
     every: Annotated[
         bool, typer.Option("--all", help="Every scenario that comes with mjspace, on all cores.")
     ] = False,

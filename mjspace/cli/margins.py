@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mjspace.errors import InputError, input_error_at
-from mjspace.terminal.options import Json, Set, Traceback, Trust
+from mjspace.terminal.options import Json, Scenario, Set, Traceback, Trust, Workers
 from mjspace.terminal.reporting import cause_shown, count_bar
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def margins(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    scenario: Scenario,
     overrides: Set = [],  # noqa: B006
     require: Annotated[
         list[str],
@@ -36,22 +36,23 @@ def margins(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Picture of all flights: x.png.")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
-    ] = None,
+    workers: Workers = None,
     as_json: Json = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
     """How much delay, gain error, inertia error, sampling time and noise does the law survive?"""
     from mjspace.campaign.margins import Question, find
+    from mjspace.campaign.perturbations import KINDS
 
     if not 0.0 < tolerance < 1.0:
         raise InputError(f"--tolerance {tolerance:g}: should be between 0 and 1")
     if output is not None and output.suffix != ".png":
         raise InputError(f"--output {output}: end it in .png")
+    if output is not None and not output.absolute().parent.is_dir():
+        raise InputError(f"--output {output}: there is no folder {output.parent}")
     what = Question(scenario, tuple(overrides), tuple(require), tolerance, trust)
-    with cause_shown(traceback), count_bar(len(only) or 8, "flying") as told:
+    with cause_shown(traceback), count_bar(len(only or KINDS), "flying") as told:
         found = find(what, only, processes=workers, told=told)
     if output is not None:
         from mjspace.plotting.margins import Row, plot

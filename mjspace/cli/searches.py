@@ -8,12 +8,12 @@ from typing import Annotated, Any
 import typer
 
 from mjspace.errors import InputError, printable
-from mjspace.terminal.options import Json, Set, Traceback, Trust
+from mjspace.terminal.options import Json, Scenario, Set, Traceback, Trust, Workers
 from mjspace.terminal.reporting import cause_shown, count_bar
 
 
 def falsify(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    scenario: Scenario,
     count: Annotated[int, typer.Option("--n", help="Flights at most.")] = 200,
     overrides: Set = [],  # noqa: B006
     seed: Annotated[int | None, typer.Option(help="Seed of the search and every sensor.")] = None,
@@ -29,25 +29,24 @@ def falsify(
             "left out.",
         ),
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
-    ] = None,
+    workers: Workers = None,
     as_json: Json = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
     """Search a scenario's dispersions for a flight that fails, and make it minimal."""
-    from mjspace.campaign.campaign import folder_of
     from mjspace.campaign.falsify import falsify as search
     from mjspace.campaign.falsify import nominal_draws, write
     from mjspace.campaign.members import Campaign, population
     from mjspace.runner.output import LOG, refuse_existing
+    from mjspace.runner.run import output_folder
 
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
     what = Campaign(scenario, tuple(overrides), count, seed, trust)
     members = population(what)
-    folder = out or folder_of(what, None).parent / f"counterexample-seed-{members.scenario.seed}"
+    last = f"counterexample-seed-{members.scenario.seed}"
+    folder = output_folder(out, members.scenario.name, last)
     refuse_existing(folder / LOG, force=False)
     with cause_shown(traceback), count_bar(count, "flying") as told:
         found = search(what, go_on=go_on, processes=workers, told=told)
@@ -115,7 +114,7 @@ def _number(value: Any) -> str:
 
 
 def tune(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")],
+    scenario: Scenario,
     vary: Annotated[
         list[str],
         typer.Option(
@@ -144,28 +143,26 @@ def tune(
         Path | None,
         typer.Option("--out", help="Folder of the tuned scenario; runs/<scenario>/tuned else."),
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
-    ] = None,
+    workers: Workers = None,
     as_json: Json = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
     """Tune gains on several draws of the dispersions, and compare on others."""
-    from mjspace.campaign.campaign import folder_of
-    from mjspace.campaign.members import Campaign
+    from mjspace.campaign.members import Campaign, population
     from mjspace.campaign.tune import Goal, varied, write
     from mjspace.campaign.tune import tune as search
     from mjspace.campaign.written import SCENARIO
+    from mjspace.runner.run import output_folder
 
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
+    chosen, goal = [varied(text) for text in vary], Goal(minimized, tuple(require))
+    goal.checks()  # refuses what is none, before anything flies
     what = Campaign(scenario, tuple(overrides), count, seed, trust)
-    goal = Goal(minimized, tuple(require))
-    folder = out or folder_of(what, None).parent / "tuned"
+    folder = output_folder(out, population(what, alike=True).scenario.name, "tuned")
     if (folder / SCENARIO).exists():
         raise InputError(f"{folder / SCENARIO}: is there already: give another folder by --out")
-    chosen = [varied(text) for text in vary]
     with cause_shown(traceback), count_bar(count * draws, "flying") as told:
         found = search(what, chosen, goal, draws=draws, fresh=fresh, processes=workers, told=told)
     path = write(what, found.values, folder)

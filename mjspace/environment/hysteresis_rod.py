@@ -32,9 +32,9 @@ from mjspace.scenario.fields import NonNegative, Positive, Si, Unit3
 MAGNETIC_CONSTANT = 1.25663706127e-6  # N/A^2; CODATA 2022
 STATE = cubics.SIZE
 """Where in a rod's parameters its state begins: field [A/m] and lag [A/m]."""
-_ROD = (
-    STATE + 2
-)  # its axis (3), then Hc, (1 - q) / (2 Hc), k, 2 Bs / pi, volume / magnetic constant
+_ROD = STATE + 2
+"""Where its constants begin: axis (3), Hc, (1 - q) / (2 Hc), k, 2 Bs / pi, volume over the magnetic
+constant."""
 _WIDTH = _ROD + 8
 
 

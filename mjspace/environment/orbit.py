@@ -146,6 +146,8 @@ class Orbit(Term):
                 f"{'velocity' if by_state == ['position'] else 'position'}: missing beside "
                 f"{by_state[0]}"
             )
+        if self.position is not None and not any(self.position):
+            raise ValueError("position: got the centre of the body")
         if self.tle and self.body != "earth":
             raise ValueError('tle: is of a satellite of body = "earth"')
         if self.epoch is not None and not self.tle:

@@ -4,8 +4,9 @@ import numpy as np
 
 from mjspace.contract import Array
 
-_CIRCLE = 1e-12
-"""Eccentricity below which the place itself counts as periapsis: rounding hides which way it is."""
+_CIRCLE = 1e-15
+"""Eccentricity below which the place itself counts as periapsis: rounding hides which way it is.
+The velocity is then off by that part of itself, a few of its roundings."""
 
 
 def elements_of(position: Array, velocity: Array, time: Array, gm: float) -> Array:

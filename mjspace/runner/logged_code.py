@@ -19,9 +19,7 @@ def code_of(log: Log, scenario: Scenario, *, law: bool = True) -> dict[str, byte
     Raises:
         ValueError: an attachment is damaged.
     """
-    kinds = [scenario.reference.kind, scenario.environment.python or ""]
-    kinds += [scenario.estimator.kind] if scenario.estimator else []
-    kinds += [scenario.law.kind] if law else []
+    kinds = [kind for role, kind in scenario.kinds.items() if law or role != "law"]
     places = [kind.partition(":")[0] for kind in kinds]
     files = [place for place in places if place.endswith((".py", ".so"))]
     folders = tuple(place.partition("/")[0] + "/" for place in files if "/" in place)

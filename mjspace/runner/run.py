@@ -75,8 +75,8 @@ def run(
     return fly_to_log(assembly, path, force=force, progress=progress)
 
 
-def output_folder(out: str | Path | None, name: str) -> Path:
-    """Return where a run called ``name`` writes.
+def output_folder(out: str | Path | None, name: str, last: str = "") -> Path:
+    """Return where runs called ``name`` write, ``last`` within their folder: else the time of now.
 
     Raises:
         InputError: a name, as that of a log's scenario, which no folder can have.
@@ -85,7 +85,7 @@ def output_folder(out: str | Path | None, name: str) -> Path:
         return Path(out)
     if not is_file_name(name):
         raise InputError(f"{shortened(name)!r} is no name of a folder: give one by --out")
-    return Path("runs") / name / datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+    return Path("runs") / name / (last or datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ"))
 
 
 def fly_to_log(

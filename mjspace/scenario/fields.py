@@ -114,7 +114,10 @@ class OneOrEach:
         try:
             return inner([value])[0]
         except ValidationError as error:
-            wrong = error.errors()[0]["msg"].replace("Input should", "should")
+            detail = error.errors()[0]
+            if isinstance(cause := detail.get("ctx", {}).get("error"), ValueError):
+                raise cause from None  # which says what was given
+            wrong = detail["msg"].replace("Input should", "should")
             raise ValueError(f"got {shortened(repr(value))}, {wrong}") from None
 
 

@@ -194,6 +194,16 @@ class Scenario(Table):
     """How a campaign covers what its dispersions span. With ``latin_hypercube`` the draws depend on
     the number of members too."""
 
+    @property
+    def kinds(self) -> dict[str, str]:
+        """What it names of code, by role: law, reference, and estimator and disturbance if any."""
+        found = {"law": self.law.kind, "reference": self.reference.kind}
+        if self.estimator is not None:
+            found["estimator"] = self.estimator.kind
+        if self.environment.python is not None:
+            found["disturbance"] = self.environment.python
+        return found
+
     @model_validator(mode="before")
     @classmethod
     def _failures_are_named(cls, table: Any) -> Any:

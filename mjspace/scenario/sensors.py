@@ -34,6 +34,9 @@ of "model" are the sensors that the vehicle's own model has."""
 ALWAYS = ("attitude", "rate", "wheel_speed")
 """Quantities that an ideal sensor measures where the scenario declares none."""
 
+_VALID = "_valid"
+"""After a sensor's name: whether its sample is."""
+
 
 def kind_of(quantity: str) -> Any:
     """Return the class of the sensors that measure the ``quantity``.
@@ -94,6 +97,11 @@ def check_sensors(sensors: dict[str, Any], environment: Environment) -> None:
             raise ValueError(
                 f"sensors.{name}: {name} is a quantity, which this sensor does not measure: call "
                 "it otherwise"
+            )
+        if name.endswith(_VALID):
+            raise ValueError(
+                f"sensors.{name}: a law reads by such a name whether a sample is valid: call it "
+                "otherwise"
             )
         try:
             sensor.check_environment(environment)

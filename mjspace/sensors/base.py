@@ -180,7 +180,7 @@ class Sensor(Table, Generic[Deviation, Known, WalkDeviation, Density, Limit]):
         return _ERRORS
 
     @property
-    def sees_always(self) -> bool:
+    def always_valid(self) -> bool:
         """Whether every sample is valid; else there is a ``<name>_valid`` beside the report."""
         return True
 
@@ -225,7 +225,7 @@ class Sensor(Table, Generic[Deviation, Known, WalkDeviation, Density, Limit]):
         """Return standard normal numbers, (..., axes), as the noise's axes have them."""
         return white
 
-    def sees(self, motion: Motion) -> Array:
+    def validity(self, motion: Motion) -> Array:
         """Return 1.0 where a sample is valid and 0.0 where it is not, (..., 1)."""
         raise NotImplementedError
 

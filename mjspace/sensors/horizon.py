@@ -19,8 +19,8 @@ class HorizonSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
 
     It bisects the infrared limb of a spherical Earth (Wertz, ed., Spacecraft Attitude Determination
     and Control, 1978, section 6.2). Its errors are small rotations of that vector about the body
-    axes. It reports zeros, which are not valid, while the Earth's centre
-    is outside of its field of view.
+    axes. While the Earth's centre is out of its field of view it reports zeros, which are not
+    valid.
     """
 
     measures: Literal["nadir"] = "nadir"
@@ -36,10 +36,10 @@ class HorizonSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
     @property
     def errs(self) -> bool:
         """Whether a sample may differ from the true direction."""
-        return super().errs or not self.sees_always
+        return super().errs or not self.always_valid
 
     @property
-    def sees_always(self) -> bool:
+    def always_valid(self) -> bool:
         """Whether it looks in all directions."""
         return self.field_of_view == pi
 
@@ -52,7 +52,7 @@ class HorizonSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
         """Return the unit vector to the Earth's centre, body axes, (..., 3)."""
         return sky.nadir(motion)
 
-    def sees(self, motion: Motion) -> Array:
+    def validity(self, motion: Motion) -> Array:
         """Return 1.0 where the Earth's centre is in view, else 0.0, (..., 1)."""
         return self._in_view(sky.nadir(motion)).astype(float)
 
@@ -66,5 +66,5 @@ class HorizonSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
 
     def _in_view(self, direction: Array) -> Array:
         axis = sky.unit(self.boresight)
-        seen: Array = np.sum(direction * axis, axis=-1, keepdims=True) >= cos(self.field_of_view)
-        return seen
+        inside: Array = np.sum(direction * axis, axis=-1, keepdims=True) >= cos(self.field_of_view)
+        return inside

@@ -81,8 +81,7 @@ class Triad(
         """Return as ``Linear``, and "axes" (N, 3, 3) where the axes are not the nominal ones.
 
         What an axis reports is the vector's component along it. Its rows are the sensitive axes in
-        body axes, before the scale factors (Titterton and Weston 2004, Strapdown Inertial
-        Navigation Technology, 2nd edition, section 8.3.2: here without linearization).
+        body axes, before the scale factors; no angle is taken for small.
         """
         found = super().fixed(draw, name, axes)
         if not any(np.any(getattr(self, key)) for key in _OF_AXES):

@@ -69,7 +69,7 @@ class Sampled:
     @cached_property
     def flagged(self) -> bool:
         """Whether its samples have a validity, as a last column."""
-        return bool(self.faults) or not self.table.sees_always
+        return bool(self.faults) or not self.table.always_valid
 
     @property
     def tick(self) -> int:
@@ -248,7 +248,7 @@ class Sampled:
         result = table.with_error(table.deformed(value, self.fixed), error)
         if not self.flagged:
             return result
-        if table.sees_always:
+        if table.always_valid:
             valid = np.ones((len(result), 1))
         else:
             valid = getattr(truth, f"{self.name}_valid")

@@ -1,10 +1,10 @@
-"""Where Sun and planet stand as a vehicle sees them, for sensors that look at or away from them."""
+"""Directions of Sun, Moon and planet from a vehicle, and the sunlight there, for its sensors."""
 
 from typing import Any
 
 import numpy as np
 
-from mjspace import attitude
+from mjspace import algebra, attitude
 from mjspace.contract import Array
 from mjspace.sensors.base import Motion
 
@@ -18,13 +18,13 @@ def place(motion: Motion) -> Array:
 
 def nadir(motion: Motion) -> Array:
     """Return the unit vector to the planet's centre, body axes, (..., 3)."""
-    return attitude.rotate(attitude.conjugate(motion.attitude), -_unit(place(motion)))
+    return attitude.rotate(attitude.conjugate(motion.attitude), -attitude.normalize(place(motion)))
 
 
 def to_sun(motion: Motion) -> Array:
     """Return the unit vector to the Sun, inertial axes, (..., 3), without aberration."""
     sun: Any = motion.surroundings.sun_position
-    return _unit(sun(motion.time) - place(motion))
+    return attitude.normalize(sun(motion.time) - place(motion))
 
 
 def sun_direction(motion: Motion) -> Array:
@@ -35,7 +35,7 @@ def sun_direction(motion: Motion) -> Array:
 def moon_direction(motion: Motion) -> Array:
     """Return the unit vector to the Moon, body axes, (..., 3)."""
     moon: Any = motion.surroundings.moon_position
-    sight = _unit(moon(motion.time) - place(motion))
+    sight = attitude.normalize(moon(motion.time) - place(motion))
     return attitude.rotate(attitude.conjugate(motion.attitude), sight)
 
 
@@ -54,18 +54,16 @@ def limb(motion: Motion) -> Array:
 
 
 def from_axis(direction: Array, axis: Array) -> Array:
-    """Return the angle between a unit vector (..., 3) and a unit ``axis`` (3,) [rad], (..., 1)."""
-    cosine = np.sum(direction * axis, axis=-1, keepdims=True)
-    angle: Array = np.arccos(np.clip(cosine, -1.0, 1.0))
+    """Return the angle between a vector (..., 3) and a unit ``axis`` (3,) [rad], (..., 1).
+
+    Exact for small angles too, where a cosine tells nothing.
+    """
+    normal = algebra.cross(direction, axis)
+    sine = np.sqrt(np.sum(normal**2, axis=-1, keepdims=True))
+    angle: Array = np.arctan2(sine, np.sum(direction * axis, axis=-1, keepdims=True))
     return angle
 
 
 def unit(axis: list[float]) -> Array:
     """Return the direction of an ``axis`` of a table, (3,)."""
-    direction: Array = np.array(axis) / np.linalg.norm(axis)
-    return direction
-
-
-def _unit(vector: Array) -> Array:
-    found: Array = vector / np.sqrt(np.sum(vector**2, axis=-1, keepdims=True))
-    return found
+    return attitude.normalize(np.array(axis))

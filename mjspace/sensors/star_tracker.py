@@ -51,7 +51,7 @@ class StarTracker(Sensor[Annotated[NonNegative, Si("rad")]]):
         return self
 
     @property
-    def sees_always(self) -> bool:
+    def always_valid(self) -> bool:
         """Whether nothing blinds it."""
         exclusions = self.sun_exclusion, self.moon_exclusion, self.earth_exclusion
         return all(limit is None for limit in (*exclusions, self.rate_limit))
@@ -68,26 +68,26 @@ class StarTracker(Sensor[Annotated[NonNegative, Si("rad")]]):
                     '"earth"'
                 )
 
-    def sees(self, motion: Motion) -> Array:
+    def validity(self, motion: Motion) -> Array:
         """Return 1.0 where nothing blinds it and it turns slowly enough, else 0.0, (..., 1)."""
-        axis, seen = sky.unit(self.boresight), np.ones((*motion.rate.shape[:-1], 1))
+        axis, valid = sky.unit(self.boresight), np.ones((*motion.rate.shape[:-1], 1))
         if self.rate_limit is not None:
             square = np.sum(motion.rate**2, axis=-1, keepdims=True)
-            seen = np.where(square <= self.rate_limit**2, seen, 0.0)
+            valid = np.where(square <= self.rate_limit**2, valid, 0.0)
         if self.earth_exclusion is not None:
             off = sky.from_axis(sky.nadir(motion), axis) - sky.limb(motion)
-            seen = np.where(off >= self.earth_exclusion, seen, 0.0)
+            valid = np.where(off >= self.earth_exclusion, valid, 0.0)
         if self.sun_exclusion is not None:
             off = sky.from_axis(sky.sun_direction(motion), axis)
             dazzled = (off < self.sun_exclusion) & (sky.sunlight(motion) > 0.0)
-            seen = np.where(dazzled, 0.0, seen)
+            valid = np.where(dazzled, 0.0, valid)
         if self.moon_exclusion is not None:
             moon = sky.moon_direction(motion)
             near = sky.from_axis(moon, axis) < self.moon_exclusion
             away = np.sum(moon * sky.nadir(motion), axis=-1, keepdims=True)
             hidden = away > np.cos(sky.limb(motion))  # behind the Earth, which is nearer
-            seen = np.where(near & ~hidden, 0.0, seen)
-        return seen
+            valid = np.where(near & ~hidden, 0.0, valid)
+        return valid
 
     def weighted(self, white: Array) -> Array:
         """Return the numbers with those about the boresight in the ratio of the noises."""

@@ -219,8 +219,8 @@ def _sampled(
     if table.at_control and period % rates.steps:
         whole_number(seconds, rates.control, f"sensors.{name}.period", "rates.control")
     own = of_sensor(name, faults)
-    sees_all = table.sees_always and not own
-    if sees_all and not (table.errs or table.integrates or table.delay or rates.steps % period):
+    always = table.always_valid and not own
+    if always and not (table.errs or table.integrates or table.delay or rates.steps % period):
         return None
     steps = table.delay and whole_number(
         table.delay, rates.physics, f"sensors.{name}.delay", "rates.physics"

@@ -36,7 +36,7 @@ class SunSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
     unit: ClassVar[str] = ""
 
     @property
-    def sees_always(self) -> bool:
+    def always_valid(self) -> bool:
         """Never: there are eclipses."""
         return False
 
@@ -48,12 +48,12 @@ class SunSensor(Sensor[Annotated[NonNegative, Si("rad")]]):
         """Return the unit vector to the Sun, body axes, (..., 3)."""
         return sky.sun_direction(motion)
 
-    def sees(self, motion: Motion) -> Array:
+    def validity(self, motion: Motion) -> Array:
         """Return 1.0 where the Sun is in view and shines, else 0.0, (..., 1)."""
         axis, direction = sky.unit(self.boresight), sky.sun_direction(motion)
         in_view = np.sum(direction * axis, axis=-1, keepdims=True) >= cos(self.field_of_view)
-        seen: Array = in_view & (sky.sunlight(motion) >= _HALF_DISC)
-        return seen.astype(float)
+        valid: Array = in_view & (sky.sunlight(motion) >= _HALF_DISC)
+        return valid.astype(float)
 
     def with_error(self, value: Array, error: Array) -> Array:
         """Return the vector turned by the rotation vector ``error`` [rad]."""

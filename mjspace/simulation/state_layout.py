@@ -58,8 +58,8 @@ class StateLayout:
         }
         self.environment = assembly.scenario.environment
         self.boresights = assembly.scenario.plant.boresights
-        self.seen = {
-            f"{name}_valid": sensor for name, sensor in sensors.items() if not sensor.sees_always
+        self.validated = {
+            f"{name}_valid": sensor for name, sensor in sensors.items() if not sensor.always_valid
         }
         drives = [kind.drives for kind in assembly.actuators.kinds]
         userdata = mujoco.mj_stateSize(model, _BEFORE_USERDATA)
@@ -76,11 +76,11 @@ class StateLayout:
             none = np.zeros((*physics.shape[:-1], self.feet))
             one = none[..., :1]
             truth = truth._replace(contact=one, foot_contact=none, hull_contact=one)
-        if self.measured or self.seen:
+        if self.measured or self.validated:
             motion = self.moving_bus(physics)
             measured = {name: sensor.true_value(motion) for name, sensor in self.measured.items()}
-            seen = {name: sensor.sees(motion) for name, sensor in self.seen.items()}
-            truth = truth._replace(**measured, **seen)
+            validity = {name: sensor.validity(motion) for name, sensor in self.validated.items()}
+            truth = truth._replace(**measured, **validity)
         return truth
 
     def with_surroundings(self, physics: Array, truth: Measurement) -> Truth:
@@ -102,7 +102,7 @@ class StateLayout:
         return Truth(**{name: known[name] for name in Truth._fields})
 
     def in_orbit(self, physics: Array) -> dict[str, Array]:
-        """Return what is seen of Sun and Moon, where above the Earth, and where boresights look.
+        """Return where Sun and Moon are, where above the Earth, and where boresights look.
 
         Nothing where that is not known.
         """

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")]
 Set = Annotated[
     list[str],
     typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario; repeatable."),
@@ -16,6 +17,9 @@ Out = Annotated[
     typer.Option("--out", help="Folder to write; runs/<scenario>/<UTC stamp> when left out."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace a log that is there already.")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, help="Processes that fly; one a core when left out.")
+]
 Plot = Annotated[bool, typer.Option("--plot", help="Also plot the log: flight.png.")]
 Report = Annotated[
     bool, typer.Option("--report", help="Also write a report of the log: flight.html.")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_lines import command_line
+from one_axis import ONE_AXIS, written
 
 from mjspace.campaign import robustness
 from mjspace.campaign.falsify import falsify, nominal_draws
@@ -19,19 +20,9 @@ from mjspace.runner.checks import Verdict
 from mjspace.runner.run import run
 from mjspace.scenario.scenario import Check
 
-SCENARIO = """
-base = "detumble-wheels"
-description = "Rate damping about one axis, called every half second"
-duration = "10 s"
-
-[rates]
-physics = "0.5 s"
-control = "0.5 s"
-
-[initial]
-rate = [0.01, 0, 0]
-wheel_speed = [0, 0, 0]
-
+SCENARIO = (
+    ONE_AXIS.replace("checks = []", "")
+    + """
 [[checks]]
 name = "rate"
 signal = "truth.rate"
@@ -55,19 +46,14 @@ key = "initial.rate[1]"
 distribution = "normal"
 std = 1e-4
 """
+)
 UNSTABLE = 2.0 / 0.5
 """Gain over inertia from which on it is: w[k + 1] = (1 - T gain / inertia) w[k]."""
 
 
-def scenario(folder: Path, text: str = SCENARIO) -> str:
-    path = folder / "one_axis.toml"
-    path.write_text(text)
-    return str(path)
-
-
 @pytest.mark.usefixtures("here")
 def test_the_weakness_is_found_and_made_minimal(tmp_path: Path) -> None:
-    found = falsify(Campaign(scenario(tmp_path), (), 200, 1))
+    found = falsify(Campaign(written(tmp_path, SCENARIO), (), 200, 1))
     assert found.worst.margin < 0.0
     assert 0 < found.before <= found.flights <= 200
     gain, inertia, rate = found.worst.draws
@@ -82,7 +68,7 @@ def test_the_weakness_is_found_and_made_minimal(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("here")
 def test_where_nothing_fails_the_least_margin_is_told(tmp_path: Path) -> None:
     safe = SCENARIO.replace("high = 30", "high = 20")
-    found = falsify(Campaign(scenario(tmp_path, safe), (), 30, 1))
+    found = falsify(Campaign(written(tmp_path, safe), (), 30, 1))
     assert found.minimal is None
     assert (found.before, found.flights) == (0, 31)  # the first is the scenario as it is
     assert 0.0 < found.worst.margin < 1.0
@@ -91,7 +77,7 @@ def test_where_nothing_fails_the_least_margin_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("here")
 def test_the_same_seed_finds_the_same_and_a_search_goes_on_if_asked(tmp_path: Path) -> None:
-    path = scenario(tmp_path)
+    path = written(tmp_path, SCENARIO)
     once, again = (falsify(Campaign(path, (), 40, 7)) for _ in range(2))
     assert once == again
     longer = falsify(Campaign(path, (), 40, 7), go_on=True)
@@ -102,7 +88,9 @@ def test_the_same_seed_finds_the_same_and_a_search_goes_on_if_asked(tmp_path: Pa
 
 def test_a_scenario_that_fails_as_it_is_or_has_no_dispersions_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="fails as it is: FAIL rate"):
-        falsify(Campaign(scenario(tmp_path), ("law.rate_gain=41",), 10, 1), processes=1)
+        falsify(Campaign(written(tmp_path, SCENARIO), ("law.rate_gain=41",), 10, 1), processes=1)
+    with pytest.raises(InputError, match="no checks"):
+        falsify(Campaign(written(tmp_path, SCENARIO), ("checks=[]",), 10, 1))
     with pytest.raises(InputError, match="there is nothing to search"):
         falsify(Campaign("wheel-failure", (), 10, 1))
 
@@ -110,7 +98,7 @@ def test_a_scenario_that_fails_as_it_is_or_has_no_dispersions_is_refused(tmp_pat
 def test_a_scenario_without_a_value_of_its_own_starts_from_the_median(tmp_path: Path) -> None:
     text = SCENARIO.replace('key = "initial.rate[1]"', 'key = "plant.wheels.torque_limit"')
     text = text.replace('"normal"\nstd = 1e-4', '"uniform"\nlow = 1\nhigh = 4')
-    own = nominal_draws(population(Campaign(scenario(tmp_path, text), (), 1, 1)))
+    own = nominal_draws(population(Campaign(written(tmp_path, text), (), 1, 1)))
     assert own == pytest.approx([6.0, 10.0, 2.5])
 
 
@@ -181,7 +169,7 @@ def test_the_counterexample_is_a_scenario_and_a_log_of_its_own(
         "class Own(RateDamping):\n    pass\n"
     )
     law = '[law]\nkind = "own.py:Own"\nrate_gain = 6\n\n[initial]'
-    path = scenario(tmp_path, SCENARIO.replace("[initial]", law))
+    path = written(tmp_path, SCENARIO.replace("[initial]", law))
     out = tmp_path / "out"
     words = ["falsify", path, "--n", "60", "--seed", "1", "--out", str(out), "--workers", "2"]
     assert command_line(*words, "--json") == 1

@@ -6,25 +6,13 @@ from pathlib import Path
 
 import pytest
 from command_lines import command_line
+from one_axis import ONE_AXIS, written
 
 from mjspace.campaign.margins import Margin, Question, Trial, find
 from mjspace.campaign.requirement import objective, requirement
 from mjspace.errors import InputError
 
-SCENARIO = """
-base = "detumble-wheels"
-description = "Rate damping about one axis, called every half second"
-duration = "300 s"
-checks = []
-
-[rates]
-physics = "0.5 s"
-control = "0.5 s"
-
-[initial]
-rate = [0.01, 0, 0]
-wheel_speed = [0, 0, 0]
-"""
+SCENARIO = ONE_AXIS.replace("10 s", "300 s")
 STABLE = "max(truth.rate) < 0.01 rad/s from 250 s"
 FED_BACK = 0.5 * 6.0 / (10.0 - 0.05)
 """a of w[k + 1] = w[k] - a w[k - d]: period times gain over the inertia of the bus about x."""
@@ -32,9 +20,7 @@ FED_BACK = 0.5 * 6.0 / (10.0 - 0.05)
 
 @pytest.fixture
 def scenario(tmp_path: Path) -> str:
-    path = tmp_path / "one_axis.toml"
-    path.write_text(SCENARIO)
-    return str(path)
+    return written(tmp_path, SCENARIO)
 
 
 def margins(scenario: str, *keys: str, require: str = STABLE) -> dict[str, Margin]:
@@ -148,6 +134,9 @@ def test_a_requirement_that_is_none_is_one_line(text: str, says: str) -> None:
         (["--require", "max(truth.rte) < 1"], "truth.rte"),
         (["--require", "final(truth.rate) > 1 rad/s"], "fails as it is"),
         (["-o", "x.jpg"], "end it in .png"),
+        (["-o", "missing/x.png"], "there is no folder missing"),
+        (["--require", "max(truth.rate) < 1 m"], "checks.0.below: got 1 m for truth.rate"),
+        (["--require", "max(truth.rate) < nan"], "should be a finite number"),
         ([], "no checks"),
     ],
 )

@@ -5,26 +5,13 @@ from pathlib import Path
 
 import pytest
 from command_lines import command_line
+from one_axis import ONE_AXIS, written
 
 from mjspace.campaign.members import Campaign
 from mjspace.campaign.tune import Goal, Varied, tune, varied
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load
 
-SCENARIO = """
-base = "detumble-wheels"
-description = "Rate damping about one axis, called every half second"
-duration = "10 s"
-checks = []
-
-[rates]
-physics = "0.5 s"
-control = "0.5 s"
-
-[initial]
-rate = [0.01, 0, 0]
-wheel_speed = [0, 0, 0]
-"""
 INERTIA = """
 [[dispersions]]
 key = "plant.gyrostat_inertia[0][0]"
@@ -38,15 +25,9 @@ GAIN = [Varied("law.rate_gain", 1.0, 100.0)]
 GOAL = Goal("rms(truth.rate)", ())
 
 
-def scenario(folder: Path, text: str = SCENARIO) -> str:
-    path = folder / "one_axis.toml"
-    path.write_text(text)
-    return str(path)
-
-
 @pytest.mark.usefixtures("here")
 def test_the_best_gain_of_one_flight_is_that_of_the_closed_form(tmp_path: Path) -> None:
-    found = tune(Campaign(scenario(tmp_path), (), 40, 1), GAIN, GOAL, draws=4, fresh=5)
+    found = tune(Campaign(written(tmp_path), (), 40, 1), GAIN, GOAL, draws=4, fresh=5)
     assert found.values["law.rate_gain"] == pytest.approx(DEADBEAT, rel=0.02)
     assert found.own == {"law.rate_gain": 6}
     # Only the first of 21 samples is left of the rate.
@@ -59,15 +40,15 @@ def test_the_best_gain_of_one_flight_is_that_of_the_closed_form(tmp_path: Path) 
 @pytest.mark.usefixtures("here")
 def test_a_requirement_bounds_the_gain(tmp_path: Path) -> None:
     goal = Goal("rms(truth.rate)", ("peak(command.torque) < 0.1 N m",))
-    found = tune(Campaign(scenario(tmp_path), (), 40, 1), GAIN, goal, draws=1, fresh=1)
+    found = tune(Campaign(written(tmp_path), (), 40, 1), GAIN, goal, draws=1, fresh=1)
     assert 9.4 < found.values["law.rate_gain"] <= 10.0
     hard = Goal("rms(truth.rate)", ("peak(command.torque) < 0.05 N m",))
-    assert tune(Campaign(scenario(tmp_path), (), 20, 1), GAIN, hard, draws=1, fresh=1).before.missed
+    assert tune(Campaign(written(tmp_path), (), 20, 1), GAIN, hard, draws=1, fresh=1).before.missed
 
 
 @pytest.mark.usefixtures("here")
 def test_several_draws_are_tuned_on_and_others_compared(tmp_path: Path) -> None:
-    path = scenario(tmp_path, SCENARIO + INERTIA)
+    path = written(tmp_path, ONE_AXIS + INERTIA)
     found = tune(Campaign(path, (), 30, 1), GAIN, GOAL, draws=3, fresh=6)
     assert 8.0 / 0.5 < found.values["law.rate_gain"] < 12.0 / 0.5
     assert found.better == 6
@@ -92,13 +73,17 @@ def test_bounds_are_in_si_and_their_logarithm_is_covered() -> None:
         (["--vary", "checks=1..2"], "is no part of the flight"),
         (["--vary", "plant.gyrostat_inertia[0][0]=1..2"], "it is dispersed"),
         (["--vary", "law.rate_gain=1..2", "--minimize", "rms(rate)"], "rate"),
+        (["--vary", "law.rate_gain=1..2", "--vary", "law.rate_gain=3..4"], "is given twice"),
+        (["--vary", "law.rate_gain=1 m..2 m"], "should be N m s/rad"),
+        (["--vary", "law.rate_gain=1 m..2 s"], "both bounds should be of one dimension"),
+        (["--vary", "initial.rate=1..2"], "initial.rate is [0.01, 0.0, 0.0], should be a number"),
         (["--vary", "law.rate_gain=1..2", "--minimize", "truth.rate"], "should be as 'rms("),
     ],
 )
 def test_bad_input_is_one_line(
     options: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, out = scenario(tmp_path, SCENARIO + INERTIA), tmp_path / "out"
+    path, out = written(tmp_path, ONE_AXIS + INERTIA), tmp_path / "out"
     asked = [] if "--minimize" in options else ["--minimize", "rms(truth.rate)"]
     assert command_line("tune", path, *asked, *options, "--out", str(out)) == 2
     shown = capsys.readouterr()
@@ -108,15 +93,25 @@ def test_bad_input_is_one_line(
 
 
 def test_a_value_that_is_dispersed_too_is_refused(tmp_path: Path) -> None:
-    path = scenario(tmp_path, SCENARIO + INERTIA)
+    path = written(tmp_path, ONE_AXIS + INERTIA)
     what = [Varied("plant.gyrostat_inertia[0][0]", 1.0, 2.0)]
     with pytest.raises(InputError, match="it is dispersed"):
         tune(Campaign(path, (), 3, 1), what, GOAL, draws=1, fresh=1)
 
 
+@pytest.mark.usefixtures("here")
+def test_a_scenario_without_dispersions_has_a_folder_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    options = ["--vary", "law.rate_gain=5..6", "--minimize", "rms(truth.rate)", "--n", "1"]
+    assert command_line("tune", written(tmp_path), *options) == 0
+    assert load(tmp_path / "runs" / "one_axis" / "tuned" / "scenario.toml")
+
+
 @pytest.mark.slow
 def test_the_tuned_scenario_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path, out = scenario(tmp_path, SCENARIO + INERTIA), tmp_path / "out"
+    path, out = written(tmp_path, ONE_AXIS + INERTIA), tmp_path / "out"
     words = ["tune", path, "--vary", "law.rate_gain=1..100", "--minimize", "rms(truth.rate)"]
     words += ["--n", "8", "--draws", "2", "--fresh", "2", "--seed", "1", "--out", str(out)]
     assert command_line(*words, "--json") == 0

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -24,6 +24,7 @@ def of_state(place: Array, velocity: Array) -> Orbit:
     return Orbit(position=place.tolist(), velocity=velocity.tolist())
 
 
+@settings(max_examples=300, deadline=None)  # the first one compiles
 @given(
     st.sampled_from([0.0, 1e-15, 1e-13, 1e-11, 1e-8, 1e-3, 0.1, 0.7]),
     st.sampled_from([0.0, 1e-12, 1e-6, 0.9, np.pi / 2, np.pi - 1e-12, np.pi]),
@@ -79,6 +80,10 @@ def test_a_motion_is_its_own_at_any_time() -> None:
         (
             {"position": [7e6, 0, 0], "velocity": [0, 7.6e3, 0], "j2": True},
             "j2: the rates are of mean elements: a position and velocity have none",
+        ),
+        (
+            {"position": [0, 0, 0], "velocity": [0, 7.5e3, 0]},
+            "position: got the centre of the body",
         ),
         ({"semi_major_axis": 7e6, "epoch": "2026-01-01"}, "epoch: is of an orbit from a tle"),
     ],

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from blocks import blocks_of
 from log_samples import rewritten
-from mjspace.controllers.landing import lander_estimator
+from mjspace.controllers.landing.lander_estimator import EstimatedVectoring
 
 from mjspace.contract import Measurement, Reference
 from mjspace.errors import InputError
@@ -105,8 +105,8 @@ def test_a_log_from_before_fields_were_renamed_flies_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as earlier:
-        for name in ("VectoringState", "VectoringSignals"):
-            earlier.setattr(lander_estimator, name, renamed(getattr(lander_estimator, name)))
+        own, *joined = EstimatedVectoring.kinds
+        earlier.setattr(EstimatedVectoring, "kinds", (own, *map(renamed, joined)))
         old = run("lander-estimated", overrides=["duration=0.1", "checks=[]"], out=tmp_path)
     assert {"wanted_thrust", "believed_position"} <= old.log.topics["/law"].keys()
     assert "law_believed_bias" in old.log.topics["/state"]

@@ -78,6 +78,7 @@ def test_written_out_and_read_back_is_the_same(minimal: Path) -> None:
         ("sensors.thrust.measures=rate", ["sensors.thrust: thrust is a quantity"]),
         ("sensors.rate.measures=attitude", ["sensors.rate: rate is a quantity"]),
         ("sensors.magnetic_field={}", ["sensors.magnetic_field: needs an"]),
+        ("sensors.a_valid={measures='rate'}", ["sensors.a_valid: a law reads by such a name"]),
         ("sensors=3", ["sensors: got 3, should be a table"]),
         ("rates.control='1.5 ms'", ["rates.control", "0.0015", "0.002"]),
         ("rates.integrator=rk4", ["rates.integrator", "rk4", "RK4"]),

@@ -38,7 +38,7 @@ def motion(turn: Any = (0.0, 0.0, 0.0), sun: Array = SUN, rate: Any = (0.0, 0.0,
 
 
 def seen(table: dict[str, Any], *where: Any, kind: Any = StarTracker, **other: Any) -> float:
-    return float(kind.model_validate(table).sees(motion(*where, **other))[0, 0])
+    return float(kind.model_validate(table).validity(motion(*where, **other))[0, 0])
 
 
 @pytest.mark.parametrize(("angle", "valid"), [(0.49, 0.0), (0.51, 1.0), (-0.49, 0.0), (-0.51, 1.0)])

@@ -62,3 +62,12 @@ def test_it_meets_its_target_from_where_it_is_thrown() -> None:
     expected = target.position - 3.0 * target.velocity + 4.5 * target.acceleration
     assert r == pytest.approx(expected, abs=0.5)
     assert v == pytest.approx(target.velocity - 3.0 * target.acceleration, abs=0.3)
+
+
+def test_no_time_to_go_is_taken_for_less_than_a_second() -> None:
+    target = Target(*(np.array(row) for row in ([10.0, 0, 30], [0.0, 0, -2], [0.2, 0, 0.1])))
+    r, v = np.array([12.0, 1.0, 32.0]), np.array([-1.0, 0.0, -2.5])
+    # a_T + 12 (r_T - r) / t^2 - 6 (v + v_T) / t at t = 1 s
+    right = [0.2 - 24.0 + 6.0, -12.0, 0.1 - 24.0 + 27.0]
+    for left in (1.0, 0.3, 0.0, -2.0):
+        assert acceleration(r, v, target, np.array([left])) == pytest.approx(right)

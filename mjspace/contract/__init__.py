@@ -6,11 +6,11 @@ from typing import Annotated, Any, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mjspace.commands import GimbalRateCommand as GimbalRateCommand
-from mjspace.commands import PulseCommand as PulseCommand
-from mjspace.commands import ThrustCommand as ThrustCommand
-from mjspace.commands import TorqueCommand as TorqueCommand
-from mjspace.commands import VoltageCommand as VoltageCommand
+from mjspace.contract.commands import GimbalRateCommand as GimbalRateCommand
+from mjspace.contract.commands import PulseCommand as PulseCommand
+from mjspace.contract.commands import ThrustCommand as ThrustCommand
+from mjspace.contract.commands import TorqueCommand as TorqueCommand
+from mjspace.contract.commands import VoltageCommand as VoltageCommand
 from mjspace.ranges import Gains as Gains
 from mjspace.ranges import gain as gain
 from mjspace.units import Unit as Unit
