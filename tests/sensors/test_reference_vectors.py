@@ -70,7 +70,7 @@ def test_the_sun_is_seen_outside_of_the_shadow_alone() -> None:
     beside = [-RADIUS * s + x * across for x in (0.0, 6.3e6, 6.4e6)]
     motion = moving(np.array([*beside, RADIUS * s, 6.9e6 * across]))
     seen, known = SunSensor().true_value(motion), SunReference().true_value(motion)
-    assert np.array_equal(SunSensor().sees(motion)[:, 0], [0.0, 0.0, 1.0, 1.0, 1.0])
+    assert np.array_equal(SunSensor().validity(motion)[:, 0], [0.0, 0.0, 1.0, 1.0, 1.0])
     assert np.allclose(np.linalg.norm(known, axis=-1), 1.0, rtol=1e-15)
     assert np.allclose(att.rotate(motion.attitude, seen), known, atol=1e-15)
     # The bus is 7000 km from where the Sun's direction is s: 5e-5 rad at most.
