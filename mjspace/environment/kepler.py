@@ -43,20 +43,31 @@ def position(orbit: Any, time: float) -> tuple[float, float, float]:
 
 
 @compiled
-def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
-    """Return the velocity [m/s], inertial axes, at ``time`` [s]; ``orbit`` as for ``position``."""
+def motion(orbit: Any, time: float) -> tuple[float, float, float, float, float, float]:
+    """Return ``position`` and ``velocity``, one solution of Kepler's equation for both."""
     anomaly = eccentric_anomaly(orbit[2] + orbit[1] * time, orbit[3])
-    rate = orbit[1] / (1.0 - orbit[3] * math.cos(anomaly))
-    along, across = -rate * math.sin(anomaly), rate * math.cos(anomaly)
+    cosine, sine = math.cos(anomaly), math.sin(anomaly)
+    rate = orbit[1] / (1.0 - orbit[3] * cosine)
+    along, across = cosine - orbit[3], sine
+    faster, ahead = -rate * sine, rate * cosine
     return (
         along * orbit[4] + across * orbit[7],
         along * orbit[5] + across * orbit[8],
         along * orbit[6] + across * orbit[9],
+        faster * orbit[4] + ahead * orbit[7],
+        faster * orbit[5] + ahead * orbit[8],
+        faster * orbit[6] + ahead * orbit[9],
     )
 
 
+@compiled
+def velocity(orbit: Any, time: float) -> tuple[float, float, float]:
+    """Return the velocity [m/s], inertial axes, at ``time`` [s]; ``orbit`` as for ``position``."""
+    _, _, _, x, y, z = motion(orbit, time)
+    return x, y, z
+
+
 @gufunc(["void(f8[:], f8, f8[:], f8[:], f8[:])"], "(e),(),(v)->(v),(v)")
-def along(orbit: Any, time: Any, _: Any, place: Any, motion: Any) -> None:
+def along(orbit: Any, time: Any, _: Any, place: Any, speed: Any) -> None:
     """Fill in ``position`` and ``velocity`` at ``time``; the third is there for its length, 3."""
-    place[0], place[1], place[2] = position(orbit, time)
-    motion[0], motion[1], motion[2] = velocity(orbit, time)
+    place[0], place[1], place[2], speed[0], speed[1], speed[2] = motion(orbit, time)

@@ -262,10 +262,12 @@ class _Tracing(TracedArrays):
         """
         memory = self.traced_arrays(self.memory), self.traced_arrays(remembered)
         with self.program.section() as preparing:
-            written, reports = list[Write](), []
+            written, reports, followed = list[Write](), [], memory[1]
+            for effect, known in zip(self.effects, self.known, strict=True):
+                followed = effect.follow(followed, self.traced(self.physics), self.traced(known))
             for effect, known in zip(self.effects, self.known, strict=True):
                 writes, report = effect.prepare(
-                    memory[1],
+                    followed,
                     self.traced(self.physics),
                     self.traced(self.time),
                     self.traced(known),
@@ -274,8 +276,10 @@ class _Tracing(TracedArrays):
                 reports.append(report)
             masses = self._masses(*memory)
             told = self._report(reports)
+            own = tuple(remembered.values())
+            after = self.following(own, tuple(followed[name] for name in remembered))
         prove(preparing[0], self.program.memory)
-        return Section(preparing[0], [], told), written, masses
+        return Section(preparing[0], changes(own, after), told), written, masses
 
     def _masses(self, before: Any, after: Any) -> list[Write]:
         """Return the masses and inertias for a step between what is remembered at its ends."""

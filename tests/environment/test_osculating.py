@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -24,6 +24,7 @@ def of_state(place: Array, velocity: Array) -> Orbit:
     return Orbit(position=place.tolist(), velocity=velocity.tolist())
 
 
+@settings(deadline=None)  # it compiles at first
 @given(
     st.sampled_from([0.0, 1e-15, 1e-13, 1e-11, 1e-8, 1e-3, 0.1, 0.7]),
     st.sampled_from([0.0, 1e-12, 1e-6, 0.9, np.pi / 2, np.pi - 1e-12, np.pi]),
@@ -45,7 +46,8 @@ def test_it_is_the_orbit_of_the_elements(
     np.testing.assert_allclose(
         orbit_position(again, TIMES), orbit_position(orbit, TIMES), atol=2e-5
     )
-    np.testing.assert_allclose(state(again)[1], state(orbit)[1], atol=1e-10)
+    # an eccentricity below 1e-12 counts as none: 1e-12 of 3.6e3 m/s
+    np.testing.assert_allclose(state(again)[1], state(orbit)[1], atol=4e-9)
 
 
 def test_a_motion_is_its_own_at_any_time() -> None:
