@@ -90,6 +90,7 @@ class _Tracing(TracedArrays):
         )
         law = assembly.law
         self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
+        self.sensed: Any = None  # the truth that the sensors sample
 
     def with_law(self) -> PeriodProgram:
         """Return the program of sensors, law and actuators.
@@ -151,7 +152,7 @@ class _Tracing(TracedArrays):
         """Return the program that goes on with the actuators; ``recorded`` is of what is before."""
         own = tuple(self.memory.values())
         with self.program.section() as driving:
-            truth, motors, inner = self._truth(), self.traced_tuple(command), self.law_state
+            truth, motors, inner = self._acted_on(kinds), self.traced_tuple(command), self.law_state
             if self.assembly.inner:
                 held = self.suite.report(self.traced_arrays(self.sensors), truth)
                 inner, motors = self._law_inner(motors, held)
@@ -223,7 +224,7 @@ class _Tracing(TracedArrays):
         waiting = [effect for effect in self.effects if effect.waits]
         if not waiting:
             return np.zeros(0)
-        topics = {"truth": self._truth(), "measurement": measurement}
+        topics = {"truth": self.sensed, "measurement": measurement}
         topics |= {"command": command, **topics_of(signals)}
         memory = self.traced_arrays(self.memory)
         return self._report([effect.alarm(memory, topics) for effect in waiting])
@@ -301,11 +302,23 @@ class _Tracing(TracedArrays):
         physics, memory = self.traced(self.physics), self.traced_arrays(self.memory)
         return truth_of(physics, memory, self.layout, self.assembly.actuators, self.effects)
 
+    def _acted_on(self, kinds: dict[str, type]) -> Any:
+        """Return the truth for actuators: no more of it than the stepper has between instants.
+
+        What sensors see of the sky would take most of a step's calls.
+        """
+        if self.assembly.inner or any(effect.needs_truth for effect in self.effects):
+            return self._truth()
+        if self.assembly.driven_stepwise:
+            return self.layout.motion(self.traced(self.physics))
+        return self.sensed if "law" in kinds else self._truth()
+
     def _sample(self) -> tuple[Any, Any]:
         """Return what the sensors remember after a sample, and the measurement."""
         sensors = self.traced_arrays(self.sensors)
         phase = self.traced_arrays(self.memory).get(PHASE)
-        sampled, measurement = self.suite.sample_where_due(sensors, self._truth(), phase)
+        self.sensed = self._truth()
+        sampled, measurement = self.suite.sample_where_due(sensors, self.sensed, phase)
         before = tuple(self.sensors.values())
         return self.following(before, tuple(sampled[name] for name in self.sensors)), measurement
 
