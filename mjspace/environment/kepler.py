@@ -8,14 +8,19 @@ import numpy as np
 from mjspace.environment.compiled import compiled
 from mjspace.gufunc import gufunc
 
+_STEP = 1e-8
+"""Whose square is less than the rounding of an angle [rad]."""
+
 
 @compiled
 def eccentric_anomaly(mean: float, eccentricity: float) -> float:
     """Return the root E of Kepler's equation, E - eccentricity sin E = mean [rad], in [-pi, pi].
 
     Newton's iteration from above: on [0, pi] the left side is convex, and E is at most each of
-    mean + e, mean / (1 - e) and pi, so that every step goes down until rounding stops it.
+    mean + e, mean / (1 - e) and pi, so that every step goes down until rounding stops it. After a
+    step d at most e / (1 - e) d^2 / 2 is left, which is not flown where it is less than rounding.
     """
+    enough = _STEP * math.sqrt(1.0 - eccentricity)
     mean -= 2.0 * math.pi * np.rint(mean / (2.0 * math.pi))
     target = abs(mean)
     root = min(target + eccentricity, target / (1.0 - eccentricity), math.pi)
@@ -24,6 +29,8 @@ def eccentric_anomaly(mean: float, eccentricity: float) -> float:
         lower = root - miss / (1.0 - eccentricity * math.cos(root))
         if not lower < root:
             return math.copysign(root, mean)
+        if root - lower < enough:
+            return math.copysign(lower, mean)
         root = lower
 
 
