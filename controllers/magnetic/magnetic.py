@@ -83,12 +83,12 @@ class MagneticUnloading(Regulator):
     ) -> tuple[Any, Any, Signals]:
         """Return the regulator's state and signals, and the wheels' torque and coils' moment."""
         state, wheels, signals = super().step(state, time, measurement, reference)
-        dipole, torque = _unload.ufunc(signals.h, measurement.magnetic_field, self.unloading_gain)
+        dipole, torque = unload.ufunc(signals.h, measurement.magnetic_field, self.unloading_gain)
         return state, Command(wheels.torque - torque, dipole), signals
 
 
 @gufunc(["void(f8[:],f8[:],f8,f8[:],f8[:])"], "(k),(k),()->(k),(k)")
-def _unload(h: Any, B: Any, k: Any, m: Any, torque: Any) -> None:
+def unload(h: Any, B: Any, k: Any, m: Any, torque: Any) -> None:
     """Write m = k (h x B)/B^2 [A m^2] and its torque m x B [N m]."""
     share = k / (B[0] * B[0] + B[1] * B[1] + B[2] * B[2])
     m[0] = share * (h[1] * B[2] - h[2] * B[1])

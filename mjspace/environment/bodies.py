@@ -41,15 +41,24 @@ def in_bus_axes(bodies: Bodies, x: float, y: float, z: float) -> tuple[float, fl
 
 
 @compiled
-def add_force_on_bus(bodies: Bodies, place: Any, force: Any) -> None:
-    """Add a force [N] on the bus at ``place`` [m] from its origin, both (3) in the bus's axes."""
+def add_wrench_on_bus(bodies: Bodies, force: Any, torque: Any) -> None:
+    """Add a force [N] at the bus's origin and a torque [N m], both (3) in the bus's axes."""
     dof = bodies.bus_dof
     a, b, c = bodies.cdof[dof + 3], bodies.cdof[dof + 4], bodies.cdof[dof + 5]  # the bus's axes
     for i in range(3):
         bodies.qfrc_passive[dof + i] += a[i] * force[0] + b[i] * force[1] + c[i] * force[2]
-    bodies.qfrc_passive[dof + 3] += place[1] * force[2] - place[2] * force[1]
-    bodies.qfrc_passive[dof + 4] += place[2] * force[0] - place[0] * force[2]
-    bodies.qfrc_passive[dof + 5] += place[0] * force[1] - place[1] * force[0]
+        bodies.qfrc_passive[dof + 3 + i] += torque[i]
+
+
+@compiled
+def add_force_on_bus(bodies: Bodies, place: Any, force: Any) -> None:
+    """Add a force [N] on the bus at ``place`` [m] from its origin, both (3) in the bus's axes."""
+    torque = (
+        place[1] * force[2] - place[2] * force[1],
+        place[2] * force[0] - place[0] * force[2],
+        place[0] * force[1] - place[1] * force[0],
+    )
+    add_wrench_on_bus(bodies, force, torque)
 
 
 @compiled

@@ -9,7 +9,7 @@ from pydantic import model_validator
 from mjspace.contract import Array
 from mjspace.environment import cubics, joints, kepler
 from mjspace.environment.base import Term
-from mjspace.environment.bodies import Bodies, add_force_on_bus, in_bus_axes
+from mjspace.environment.bodies import Bodies, add_wrench_on_bus, in_bus_axes
 from mjspace.environment.compiled import compiled
 from mjspace.environment.constants import RADIUS
 from mjspace.environment.earth_rotation import EARTH_ROTATION
@@ -54,11 +54,12 @@ def drag(payload: Any, time: float, bodies: Bodies) -> None:
     density [kg/m^3] is the next number, one over the scale height [1/m], the rate [rad/s] at which
     the air turns with the planet about z, then the facets as ``add_drag`` has them.
     """
-    x, y, z = place_of(payload, time, bodies)
+    (x, y, z), speed = motion_of(payload, time, bodies)
     altitude = math.sqrt(x * x + y * y + z * z) - payload[11]
     density = payload[12] * math.exp(-altitude * payload[13])
-    flow = payload[14] * y, -payload[14] * x
-    add_drag(payload, time, bodies, density, flow, _FACETS)
+    turning = payload[14]
+    flow = speed[0] + turning * y, speed[1] - turning * x, speed[2]
+    add_drag(payload, bodies, density, flow, _FACETS)
 
 
 @compiled
@@ -69,48 +70,51 @@ def drag_along(payload: Any, time: float, bodies: Bodies) -> None:
     ``nrlmsis.along`` makes it, the rate [rad/s] at which the air turns with the planet about z,
     then the facets as ``add_drag`` has them.
     """
-    x, y, z = place_of(payload, time, bodies)
+    (x, y, z), speed = motion_of(payload, time, bodies)
     air, since = payload[_AIR:_FACETS_ALONG], time - payload[_AIR]
     higher = math.sqrt(x * x + y * y + z * z) - cubics.component(air, 1, since)
     falling = cubics.component(air, 2, since)
     density = math.exp(cubics.component(air, 0, since) - higher * falling)
-    flow = air[cubics.SIZE] * y, -air[cubics.SIZE] * x
-    add_drag(payload, time, bodies, density, flow, _FACETS_ALONG)
+    turning = air[cubics.SIZE]
+    flow = speed[0] + turning * y, speed[1] - turning * x, speed[2]
+    add_drag(payload, bodies, density, flow, _FACETS_ALONG)
 
 
 @compiled
-def place_of(payload: Any, time: float, bodies: Bodies) -> tuple[float, float, float]:
-    """Return the bus's place [m] from the planet's centre, inertial axes."""
-    place = int(payload[0])
-    x, y, z = kepler.position(payload[1:11], time)
-    return x + bodies.qpos[place], y + bodies.qpos[place + 1], z + bodies.qpos[place + 2]
+def motion_of(payload: Any, time: float, bodies: Bodies) -> tuple[Any, Any]:
+    """Return the bus's place [m] from the planet's centre and velocity [m/s], inertial axes."""
+    place, dof = int(payload[0]), bodies.bus_dof
+    x, y, z, vx, vy, vz = kepler.motion(payload[1:11], time)
+    at = x + bodies.qpos[place], y + bodies.qpos[place + 1], z + bodies.qpos[place + 2]
+    return at, (vx + bodies.qvel[dof], vy + bodies.qvel[dof + 1], vz + bodies.qvel[dof + 2])
 
 
 @compiled
-def add_drag(
-    payload: Any, time: float, bodies: Bodies, density: float, flow: Any, first: int
-) -> None:
+def add_drag(payload: Any, bodies: Bodies, density: float, flow: Any, first: int) -> None:
     """Add the drag on each facet that faces the flow: -1/2 rho C A (n . v) v.
 
     v is the velocity of the facet relative to the air, n its outward normal, C its drag
     coefficient (Wertz 1978, Spacecraft Attitude Determination and Control, equation 17-57). For
     each facet the ``payload`` has, from ``first`` on, half of C A [m^2], n (3) and the centre of
-    pressure (3) [m], body axes; ``flow`` is what the air's turn adds to v, x and y [m/s].
+    pressure (3) [m], body axes; ``flow`` is the bus's velocity relative to the air, inertial axes
+    [m/s].
     """
-    dof = bodies.bus_dof
-    vx, vy, vz = kepler.velocity(payload[1:11], time)
-    vx, vy, vz = vx + bodies.qvel[dof], vy + bodies.qvel[dof + 1], vz + bodies.qvel[dof + 2]
-    vx, vy, vz = in_bus_axes(bodies, vx + flow[0], vy + flow[1], vz)
-    wx, wy, wz = bodies.qvel[dof + 3], bodies.qvel[dof + 4], bodies.qvel[dof + 5]
+    dof = bodies.bus_dof + 3
+    vx, vy, vz = in_bus_axes(bodies, flow[0], flow[1], flow[2])
+    wx, wy, wz = bodies.qvel[dof], bodies.qvel[dof + 1], bodies.qvel[dof + 2]
+    fx = fy = fz = tx = ty = tz = 0.0
     for i in range(first, payload.size, _WIDTH):
-        n, arm = payload[i + 1 : i + 4], payload[i + 4 : i + 7]
-        ux = vx + wy * arm[2] - wz * arm[1]
-        uy = vy + wz * arm[0] - wx * arm[2]
-        uz = vz + wx * arm[1] - wy * arm[0]
-        into = n[0] * ux + n[1] * uy + n[2] * uz
+        ax, ay, az = payload[i + 4], payload[i + 5], payload[i + 6]
+        ux, uy, uz = vx + wy * az - wz * ay, vy + wz * ax - wx * az, vz + wx * ay - wy * ax
+        into = payload[i + 1] * ux + payload[i + 2] * uy + payload[i + 3] * uz
         if into > 0.0:
             scale = -density * payload[i] * into
-            add_force_on_bus(bodies, arm, (scale * ux, scale * uy, scale * uz))
+            px, py, pz = scale * ux, scale * uy, scale * uz
+            fx, fy, fz = fx + px, fy + py, fz + pz
+            tx += ay * pz - az * py
+            ty += az * px - ax * pz
+            tz += ax * py - ay * px
+    add_wrench_on_bus(bodies, (fx, fy, fz), (tx, ty, tz))
 
 
 class Nrlmsis(Table):

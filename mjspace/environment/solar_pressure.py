@@ -8,7 +8,7 @@ import numpy as np
 from mjspace.contract import Array
 from mjspace.environment import cubics, joints, kepler, shadow
 from mjspace.environment.base import Term
-from mjspace.environment.bodies import Bodies, add_force_on_bus, in_bus_axes
+from mjspace.environment.bodies import Bodies, add_wrench_on_bus, in_bus_axes
 from mjspace.environment.compiled import compiled
 from mjspace.environment.constants import ASTRONOMICAL_UNIT, RADIUS, SUN_RADIUS
 from mjspace.scenario.environment import Environment
@@ -60,11 +60,7 @@ def press(payload: Any, time: float, bodies: Bodies) -> None:
             tx += ay * pz - az * py
             ty += az * px - ax * pz
             tz += ax * py - ay * px
-    add_force_on_bus(bodies, (0.0, 0.0, 0.0), (fx, fy, fz))
-    dof = bodies.bus_dof + 3
-    bodies.qfrc_passive[dof] += tx
-    bodies.qfrc_passive[dof + 1] += ty
-    bodies.qfrc_passive[dof + 2] += tz
+    add_wrench_on_bus(bodies, (fx, fy, fz), (tx, ty, tz))
 
 
 class SolarPressure(Term):

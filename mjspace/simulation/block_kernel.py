@@ -45,6 +45,7 @@ ORDERS = np.dtype([
     ("weighing", *_TABLE), ("looking", *_TABLE), ("sensing", *_TABLE), ("driving", *_TABLE),
     ("preparing", *_TABLE),
     ("after_looking", *_TABLE), ("after_sensing", *_TABLE), ("after_driving", *_TABLE),
+    ("after_preparing", *_TABLE),
     # into the memory at a control instant, and before a period's steps: (to, address, strides of
     # periods and vehicles, size)
     ("inputs", *_TABLE), ("commands", *_TABLE),
@@ -163,6 +164,7 @@ def _fly_steps(
     driving, preparing = table_of(orders.driving, 5), table_of(orders.preparing, 5)
     applied, written = table_of(orders.applied, 4), table_of(orders.written, 4)
     masses, after_driving = table_of(orders.masses, 4), table_of(orders.after_driving, 3)
+    after_preparing = table_of(orders.after_preparing, 3)
     time = carray(pointer(base + orders.time), (1,), np.float64)
     motors = orders.saturated[1]
     saturated = carray(pointer(base + orders.saturated[0]), (motors,), np.float64)
@@ -189,6 +191,7 @@ def _fly_steps(
             if _told(base, orders.told_preparing):
                 return True
             write(fields, base, written)
+            _copy(base, base, after_preparing)
         if len(masses):
             step_burning(orders, function, model, data, base, of_model, fields, derived)
         else:

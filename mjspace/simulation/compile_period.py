@@ -5,7 +5,7 @@ repeats without Python.
 """
 
 import copy
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -79,17 +79,18 @@ class _Tracing(TracedArrays):
         self.physics = self.held(example.physics[:1])
         self.sensordata = self.held(example.sensordata[:1])
         self.reference = tuple_like(reference, map(self.held, reference))
-        self.memory = self._held_arrays(example.memory)
+        self.memory = self.held_arrays(example.memory)
         self.law_state = tuple_like(example.law, map(self.held_of_one, example.law))
-        self.sensors = self._held_arrays(example.sensors)
+        self.sensors = self.held_arrays(example.sensors)
         suite = assembly.sensors([0])
-        self.constants = self._held_arrays(suite.constants)
-        self.draws = self._held_arrays({name: a[0] for name, a in suite.draws([1]).items()})
+        self.constants = self.held_arrays(suite.constants)
+        self.draws = self.held_arrays({name: a[0] for name, a in suite.draws([1]).items()})
         self.suite = suite.with_errors(
             self.traced_arrays(self.constants), self.traced_arrays(self.draws)
         )
         law = assembly.law
         self.law: Any = law.law if isinstance(law, UnbatchedLaw) else law
+        self.sensed: Any = None  # the truth that the sensors sample
 
     def with_law(self) -> PeriodProgram:
         """Return the program of sensors, law and actuators.
@@ -151,7 +152,7 @@ class _Tracing(TracedArrays):
         """Return the program that goes on with the actuators; ``recorded`` is of what is before."""
         own = tuple(self.memory.values())
         with self.program.section() as driving:
-            truth, motors, inner = self._truth(), self.traced_tuple(command), self.law_state
+            truth, motors, inner = self._acted_on(kinds), self.traced_tuple(command), self.law_state
             if self.assembly.inner:
                 held = self.suite.report(self.traced_arrays(self.sensors), truth)
                 inner, motors = self._law_inner(motors, held)
@@ -223,10 +224,10 @@ class _Tracing(TracedArrays):
         waiting = [effect for effect in self.effects if effect.waits]
         if not waiting:
             return np.zeros(0)
-        topics = {"truth": self._truth(), "measurement": measurement}
+        topics = {"truth": self.sensed, "measurement": measurement}
         topics |= {"command": command, **topics_of(signals)}
         memory = self.traced_arrays(self.memory)
-        return self._report([effect.alarm(memory, topics) for effect in waiting])
+        return self.report([effect.alarm(memory, topics) for effect in waiting])
 
     def _weighing(self) -> tuple[Section, list[Write]]:
         """Return what sets the masses of a control instant: a section, and what it writes."""
@@ -249,7 +250,7 @@ class _Tracing(TracedArrays):
                     )
                     reports.append(report)
             seen = self.following(own, tuple(memory[name] for name in self.memory))
-            told = self._report(reports)
+            told = self.report(reports)
         prove(looking[0], self.program.memory)
         return Section(looking[0], changes(own, seen), told)
 
@@ -262,46 +263,50 @@ class _Tracing(TracedArrays):
         """
         memory = self.traced_arrays(self.memory), self.traced_arrays(remembered)
         with self.program.section() as preparing:
-            written, reports = list[Write](), []
+            written, reports, followed = list[Write](), [], memory[1]
+            for effect, known in zip(self.effects, self.known, strict=True):
+                followed = effect.follow(followed, self.traced(self.physics), self.traced(known))
             for effect, known in zip(self.effects, self.known, strict=True):
                 writes, report = effect.prepare(
-                    memory[1],
+                    followed,
                     self.traced(self.physics),
                     self.traced(self.time),
                     self.traced(known),
                 )
-                written += self._own_numbers(writes)
+                written += self.own_numbers(writes)
                 reports.append(report)
             masses = self._masses(*memory)
-            told = self._report(reports)
+            told = self.report(reports)
+            own = tuple(remembered.values())
+            after = self.following(own, tuple(followed[name] for name in remembered))
         prove(preparing[0], self.program.memory)
-        return Section(preparing[0], [], told), written, masses
+        return Section(preparing[0], changes(own, after), told), written, masses
 
     def _masses(self, before: Any, after: Any) -> list[Write]:
         """Return the masses and inertias for a step between what is remembered at its ends."""
         of_bodies = [each for effect in self.effects for each in effect.masses(before, after)]
-        return self._own_numbers(
+        return self.own_numbers(
             Write(name, body * values.size, values) for name, body, values in of_bodies
         )
-
-    def _own_numbers(self, writes: Iterable[Write]) -> list[Write]:
-        """Return the writes with arrays that nothing else changes."""
-        return [each._replace(values=self.numbers((each.values,))[0]) for each in writes]
-
-    def _report(self, reports: Iterable[Any]) -> np.ndarray:
-        """Return as one array where there is an event to tell."""
-        given = [report.astype(float).reshape(-1) for report in reports if report is not None]
-        return self.numbers((np.concatenate(given),))[0] if given else np.zeros(0)
 
     def _truth(self) -> Any:
         physics, memory = self.traced(self.physics), self.traced_arrays(self.memory)
         return truth_of(physics, memory, self.layout, self.assembly.actuators, self.effects)
 
+    def _acted_on(self, kinds: dict[str, type]) -> Any:
+        """Return the truth for actuators: as between control instants, without the sky."""
+        if self.assembly.inner or any(effect.needs_truth for effect in self.effects):
+            return self._truth()
+        if self.assembly.driven_stepwise:
+            return self.layout.motion(self.traced(self.physics))
+        return self.sensed if "law" in kinds else self._truth()
+
     def _sample(self) -> tuple[Any, Any]:
         """Return what the sensors remember after a sample, and the measurement."""
         sensors = self.traced_arrays(self.sensors)
         phase = self.traced_arrays(self.memory).get(PHASE)
-        sampled, measurement = self.suite.sample_where_due(sensors, self._truth(), phase)
+        self.sensed = self._truth()
+        sampled, measurement = self.suite.sample_where_due(sensors, self.sensed, phase)
         before = tuple(self.sensors.values())
         return self.following(before, tuple(sampled[name] for name in self.sensors)), measurement
 
@@ -331,9 +336,6 @@ class _Tracing(TracedArrays):
         with _of_the_law():
             after, motors = self.law.inner(state, self.traced(self.time), command, measurement)
         return after or (), motors
-
-    def _held_arrays(self, arrays: dict[str, Any]) -> dict[str, np.ndarray]:
-        return {name: self.held_of_one(array) for name, array in arrays.items()}
 
 
 @contextmanager

@@ -284,7 +284,7 @@ class CompiledFlight:
         for name in ("weighing", "looking", "sensing", "driving", "preparing"):
             calls, after, _ = getattr(period, name)
             tables[name] = calls.table + np.array([0, 0, used, used, used])
-            if name not in ("weighing", "preparing"):  # which lead to no other state
+            if name != "weighing":  # which leads to no other state
                 tables[f"after_{name}"] = self._copies(after)
             words.append(calls.words)
             relative.append(calls.relative)

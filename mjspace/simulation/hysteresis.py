@@ -6,11 +6,12 @@ import numpy as np
 
 from mjspace import attitude
 from mjspace.contract import Array
+from mjspace.environment.cubics import value_of
 from mjspace.environment.hysteresis_rod import MAGNETIC_CONSTANT, STATE, HysteresisRod, lags_after
 from mjspace.environment.install import places_of
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.state_layout import StateLayout
-from mjspace.vehicle.step_effect import Instant, State, StepEffect
+from mjspace.vehicle.step_effect import Instant, State, StepEffect, Write
 
 
 class Hysteresis(StepEffect):
@@ -22,6 +23,7 @@ class Hysteresis(StepEffect):
 
     name: ClassVar[str] = "the hysteresis rods"
     every_step: ClassVar[bool] = True
+    not_compiled = ""
 
     @classmethod
     def of(cls, assembly: Assembly, layout: StateLayout) -> Self | None:
@@ -35,7 +37,7 @@ class Hysteresis(StepEffect):
         self._places = places_of(HysteresisRod, scenario.environment, scenario.plant)
         self._axes = np.array([rod.direction for rod in self._rods])
         self._loops = np.array([[rod.coercivity, rod.rate] for rod in self._rods])
-        self._field: Any = assembly.surroundings.magnetic_field
+        self._field = assembly.known["magnetic_field"]
         self._attitude = layout.attitude
         self._parameters: Any = None
 
@@ -45,17 +47,37 @@ class Hysteresis(StepEffect):
 
     def reset(self, physics: Array) -> State:
         """Return the rods as they are without magnetization, on the middle of their loops."""
-        field = self._along_rods(physics)
+        field = self._along_rods(physics, self.known(physics[:, 0]))
         return {"rod_field": field, "rod_lag": field.copy()}
+
+    def known(self, times: Array) -> Array:
+        """Return the cubic of the Earth's field that holds from each control instant on."""
+        return self._field.rows(times)
 
     def before_step(self, memory: State, instant: Instant) -> State:
         """Follow the field to the beginning of the step."""
-        field = self._along_rods(instant.physics)
-        lag = lags_after.ufunc(memory["rod_lag"], field - memory["rod_field"], self._loops)
+        memory = self.follow(memory, instant.physics, self.known(instant.physics[:, 0]))
         for i, place in enumerate(self._places):
-            self._parameters[:, place + STATE] = field[:, i]
-            self._parameters[:, place + STATE + 1] = lag[:, i]
+            self._parameters[:, place + STATE] = memory["rod_field"][:, i]
+            self._parameters[:, place + STATE + 1] = memory["rod_lag"][:, i]
+        return memory
+
+    def follow(self, memory: State, physics: Array, known: Array) -> State:
+        """Return the memory with the field at the beginning of a step, and the lag there."""
+        field = self._along_rods(physics, known)
+        lag = lags_after.ufunc(memory["rod_lag"], field - memory["rod_field"], self._loops)
         return memory | {"rod_field": field, "rod_lag": lag}
+
+    def prepare(
+        self, memory: State, physics: Array, time: Array, known: Array
+    ) -> tuple[list[Write], Array | None]:
+        """Return that field and lag are written."""
+        states = memory["rod_field"], memory["rod_lag"]
+        return [
+            Write("userdata", place + STATE + k, state[:, i : i + 1])
+            for i, place in enumerate(self._places)
+            for k, state in enumerate(states)
+        ], None
 
     def logged(self, memory: State, sensordata: Array) -> dict[str, Array]:
         """Return the field [A/m] and the flux density [T] along each rod."""
@@ -63,9 +85,9 @@ class Hysteresis(StepEffect):
         columns = [rod.flux_density(field[..., i], lag[..., i]) for i, rod in enumerate(self._rods)]
         return {"rod_field": field, "rod_flux_density": np.stack(columns, axis=-1)}
 
-    def _along_rods(self, physics: Array) -> Array:
+    def _along_rods(self, physics: Array, known: Array) -> Array:
         """Return the Earth's field along each rod [A/m], (N, rods)."""
-        inertial = self._field(physics[:, 0])
+        inertial = value_of(known, physics[:, 0])
         body = attitude.rotate(attitude.conjugate(physics[:, self._attitude]), inertial)
         x, y, z = (body[:, i, None] * self._axes[:, i] for i in range(3))
         along: Array = (x + y + z) / MAGNETIC_CONSTANT

@@ -9,6 +9,7 @@ from mjspace.simulation.period_program import Copies
 from mjspace.tracing.inner_loops import Untraceable
 from mjspace.tracing.program import Program
 from mjspace.tracing.traced_array import TracedArray
+from mjspace.vehicle.step_effect import Write
 
 
 class TracedArrays:
@@ -44,6 +45,10 @@ class TracedArrays:
         if array.dtype not in (np.dtype(float), np.dtype(bool)):
             raise Untraceable(f"a state of {array.dtype}")
         return self.held(array[:1])
+
+    def held_arrays(self, arrays: dict[str, Any]) -> dict[str, np.ndarray]:
+        """Return one vehicle's part of named arrays likewise."""
+        return {name: self.held_of_one(array) for name, array in arrays.items()}
 
     def traced(self, array: np.ndarray) -> Any:
         """Return an array of the memory as code that is taken down receives it, read-only."""
@@ -89,6 +94,15 @@ class TracedArrays:
                 for value in values
             ),
         )
+
+    def own_numbers(self, writes: Iterable[Write]) -> list[Write]:
+        """Return the writes with arrays that nothing else changes."""
+        return [each._replace(values=self.numbers((each.values,))[0]) for each in writes]
+
+    def report(self, reports: Iterable[Any]) -> np.ndarray:
+        """Return as one array where there is an event to tell."""
+        given = [report.astype(float).reshape(-1) for report in reports if report is not None]
+        return self.numbers((np.concatenate(given),))[0] if given else np.zeros(0)
 
     def _own(self, value: Any) -> np.ndarray:
         """Return a result in a contiguous array of the memory that no input shares."""

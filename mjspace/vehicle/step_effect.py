@@ -67,8 +67,9 @@ class StepEffect(ABC):
     MuJoCo, ``after_step``.
 
     Where an effect is compiled, its methods of array code (``look``, ``add_to_truth``, ``alarm``,
-    ``change``, ``prepare``, ``masses``) are taken down. They stand for all that it does in each
-    period but those that are ``due`` and those in which they report an event: Python flies these.
+    ``change``, ``follow``, ``prepare``, ``masses``) are taken down. They stand for all that it does
+    in each period but those that are ``due`` and those in which they report an event: Python flies
+    these.
     """
 
     name: ClassVar[str]
@@ -150,6 +151,13 @@ class StepEffect(ABC):
         "measurement", "command" and "law".
         """
         return np.zeros((1, 1), bool)
+
+    def follow(self, memory: State, physics: Array, known: Array) -> State:
+        """Return the memory for the step that begins at ``physics`` (N, nstate).
+
+        Of a compiled effect, before any is asked to ``prepare``; ``known`` as there.
+        """
+        return memory
 
     def prepare(
         self, memory: State, physics: Array, time: Array, known: Array

@@ -29,7 +29,10 @@ pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
 COUNT = 4
 STEP = ["self", "state", "time", "measurement", "reference"]
-UNFLOWN = {"lander_estimator:EstimatedStructure": "lander-estimated"}
+UNFLOWN = {
+    "lander_estimator:EstimatedStructure": "lander-estimated",
+    "sun_acquisition:SunAcquisition": "sun-safe-mode",
+}
 """Laws that no scenario names, and one that can fly each."""
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from compiled_flights import flown
+from compiled_flights import assembly, assert_same, flown
 from pydantic import ValidationError
 from scipy.integrate import quad, solve_ivp
 
@@ -146,6 +146,14 @@ def test_a_batch_flies_as_one_and_a_log_is_flown_again(tmp_path: Path) -> None:
     many = flown(built, (0, 1))
     assert many.bits(0) == many.bits(1) == flown(built).bits(0)
     assert verify(run(tmp_path / "spin.toml", out=tmp_path / "x").log) is None
+
+
+@pytest.mark.usefixtures("short_blocks")
+def test_compiled_it_is_what_python_flies() -> None:
+    built = assembly("passive-magnetic", "duration=600", "rates.physics='0.5 s'")
+    compiled = flown(built, (0, 1))
+    assert "hysteresis" in compiled.compiled
+    assert_same(compiled, flown(built, (0, 1), compiled=False))
 
 
 def test_what_is_no_rod_is_refused() -> None:

@@ -1,16 +1,43 @@
 """The orbit's drift by J2: its rates, an integration of the field's forces, and continuity."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from compiled_flights import flown
 from pydantic import ValidationError
 from scipy.integrate import solve_ivp
 
 from mjspace.contract import Array
 from mjspace.environment import kepler
 from mjspace.environment.constants import GM, J2, RADIUS
-from mjspace.environment.orbit import Orbit, orbit_position
+from mjspace.environment.orbit import Orbit, orbit_position, orbit_velocity
+from mjspace.scenario.loading import load
+from mjspace.simulation.assembly import assemble
 
 DAY = 86400.0
+BESIDE = """
+description = "A satellite a metre ahead of the frame's origin, for a day"
+duration = "86400 s"
+[rates]
+physics = "10 s"
+control = "10 s"
+[environment]
+epoch = 2006-06-26T18:52:04
+[environment.orbit]
+semi_major_axis = "6878.137 km"
+inclination = "97.4 deg"
+j2 = true
+[sensors.position]
+[reference]
+kind = "references:Hold"
+[law]
+kind = "coast:Coast"
+"""
+TLE = [
+    "1 28057U 03049A   06177.78615833  .00000060  00000-0  35940-4 0  1836",
+    "2 28057  98.4283 247.6961 0000884  88.1964 271.9322 14.35478080140550",
+]
 
 
 def test_a_sun_synchronous_orbit_keeps_up_with_the_sun() -> None:
@@ -63,6 +90,40 @@ def test_it_is_the_kepler_orbit_that_turns() -> None:
     ).elements()
     there = kepler.position(later, time * (1.0 + anomaly / later[1]))
     np.testing.assert_allclose(orbit_position(drifting, time), there, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "growth"),
+    [
+        (["environment.orbit.j2=false"], 0.01),
+        ([], 0.01),  # 2459 m with GM alone
+        (["environment.orbit.inclination='30 deg'"], 0.01),
+        # 598 m; the pull is that of the mean rate, and the rate changes along the orbit
+        (
+            [
+                "environment.orbit.eccentricity=0.05",
+                "environment.orbit.semi_major_axis='7400 km'",
+            ],
+            0.25,
+        ),
+        ([f"environment.orbit={{tle={TLE}}}"], 0.1),  # 22 m
+    ],
+)
+def test_what_is_beside_the_origin_stays_there(
+    changes: list[str], growth: float, tmp_path: Path
+) -> None:
+    (tmp_path / "beside.toml").write_text(BESIDE)
+    orbit = load(tmp_path / "beside.toml", changes)[0].environment.orbit
+    assert orbit is not None
+    velocity = orbit_velocity(orbit, 0.0)
+    ahead = velocity / np.linalg.norm(velocity)
+    built = assemble(
+        *load(tmp_path / "beside.toml", [*changes, f"initial.position={ahead.tolist()}"])
+    )
+    away = np.linalg.norm(flown(built).rows["/truth.position"][:, 0], axis=-1)
+    # At rest relative to it in inertial axes, it goes three metres ahead and comes back each turn.
+    assert away[:1000].max() == pytest.approx(3.0, rel=0.05)
+    assert away.max() == pytest.approx(3.0, rel=growth)
 
 
 def test_of_the_earth_alone() -> None:

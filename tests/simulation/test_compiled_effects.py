@@ -11,7 +11,7 @@ from compiled_flights import SHORT_BLOCKS, assembly, assert_same, flown, one_of,
 
 from mjspace.environment.install import install_callbacks
 from mjspace.sensors.suite import SensorSuite
-from mjspace.simulation import loop, mujoco_warnings
+from mjspace.simulation import compile_period, compiled_blocks, loop, mujoco_warnings
 from mjspace.simulation.compiled_flight import CompiledFlight
 from mjspace.simulation.initial_state import INTEGRATION, first_start
 from mjspace.tracing.inner_loops import Untraceable
@@ -344,3 +344,18 @@ def test_a_step_without_constraints_reads_of_what_masses_make_those_of_subtrees_
         mujoco.mj_getState(model, data, end, INTEGRATION)
         ends.append(end.tobytes() + data.sensordata.tobytes())
     assert ends[0] == ends[1]
+
+
+def test_actuators_compute_nothing_of_the_sky(monkeypatch: pytest.MonkeyPatch) -> None:
+    programs: list[Any] = []
+
+    def kept(*arguments: Any, **options: Any) -> Any:
+        programs.append(compile_period.compile_period(*arguments, **options))
+        return programs[-1]
+
+    monkeypatch.setattr(compiled_blocks, "compile_period", kept)
+    flight = flown(assembly("leo-day", "duration=10"))
+    assert flight.compiled == ALL.format("the environment")
+    # Wheels and coils act in each of a period's four steps; with the truth of all sensors 619.
+    assert len(programs[0].driving.calls.table) < 20
+    assert len(programs[0].sensing.calls.table) > 500
