@@ -43,13 +43,14 @@ key = "initial.rate[0]"
 distribution = "normal"
 std = "1 deg/s"
 """
-MASS = """
+INERTIA = """
 [[dispersions]]
 key = "plant.gyrostat_inertia[1][1]"
 distribution = "uniform"
 low = 11
 high = "13 kg m^2"
-
+"""
+MASS = f"""{INERTIA}
 [[dispersions]]
 key = "law.rate_gain"
 distribution = "discrete"
@@ -77,9 +78,10 @@ def bytes_of(table: Any) -> bytes:
     return bytes(sink.getvalue())
 
 
+@pytest.mark.parametrize("text", [SCENARIO, SCENARIO + INERTIA], ids=["start", "inertia"])
 @pytest.mark.usefixtures("here")
-def test_the_table_is_the_same_however_the_members_are_divided(tmp_path: Path) -> None:
-    what = Campaign(scenario(tmp_path), (), 4, seed=2)
+def test_the_table_is_the_same_however_the_members_are_divided(text: str, tmp_path: Path) -> None:
+    what = Campaign(scenario(tmp_path, text), (), 4, seed=2)
     assert may_be_alike(population(what))
     whole = fly(what, tmp_path / "whole", block=4, keep="none")
     parts = fly(what, tmp_path / "parts", block=3, keep="none")
