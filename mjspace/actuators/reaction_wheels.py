@@ -125,8 +125,10 @@ class Wheels(ActuatorTable, PowerKeys, Bearing):
         Warns:
             ModelWarning: they are alone, and there are axes about which they give no torque.
         """
-        vehicle = context.vehicle
-        inertia = stability.inertia_at_joints(vehicle.model)[vehicle.wheel_dof[: len(self.axes)]]
+        vehicle, inertia = context.vehicle, np.zeros(0)
+        if self.speed_limit or self.efficiency is not None:
+            of_all = stability.inertia_at_joints(vehicle.model)
+            inertia = of_all[vehicle.wheel_dof[: len(self.axes)]]
         limits = self.torque_limit or inf, self.speed_limit or inf
         wheels = ReactionWheels(
             vehicle.wheel_axes,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mjspace.campaign import flights
+from mjspace.campaign.alike import may_be_alike
 from mjspace.campaign.flights import Call, fly_members, log_of
 from mjspace.campaign.members import Campaign, population
 from mjspace.campaign.store import Store
@@ -19,7 +19,7 @@ from mjspace.runner.run import Progress, Result, fly_to_log, output_folder
 TOGETHER = 32
 """Members in a batch, and in a file."""
 ONE_BY_ONE = 8
-"""Members in a file, where each has a model of its own: what an interruption costs a process."""
+"""Members in a file, where they are not alike: what an interruption costs a process."""
 Told = Callable[[int, int], None]
 """A function that is called with the numbers of members flown and failed so far."""
 
@@ -71,7 +71,7 @@ def fly(
         failed = len(done) - int(store.column("passed").sum())
         missing = [number for number in range(campaign.count) if number not in done]
         if block is None:
-            most = TOGETHER if flights.together(members) else ONE_BY_ONE
+            most = TOGETHER if may_be_alike(members) else ONE_BY_ONE
             shares = 2 * (processes or os.cpu_count() or 1)
             block = max(1, min(most, math.ceil(len(missing) / shares)))
         calls = [

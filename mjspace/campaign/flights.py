@@ -1,17 +1,19 @@
-"""Flying some members of a campaign, in a batch where they differ in where they start alone."""
+"""Flying some members of a campaign, side by side where they are alike."""
 
 import json
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mjspace.campaign.alike import alike
 from mjspace.campaign.members import Campaign, Population, population
+from mjspace.contract import Array
 from mjspace.errors import FlightError, InputError
 from mjspace.interrupts import Interrupted
 from mjspace.runner.checks import Judge, Verdict
@@ -21,12 +23,6 @@ from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.initial_state import Start, initial_physics, start_at
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import one_vehicle, shapes
-
-STARTS = {
-    f"initial.{key}"
-    for key in ("attitude", "euler", "rate", "position", "velocity", "wheel_speed", "momentum")
-}
-"""What may differ within a batch."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +55,26 @@ class Call:
     out: Path
 
 
+@dataclass(frozen=True)
+class _Member:
+    """A member that is to fly."""
+
+    number: int
+    assembly: Assembly
+    physics: Array
+    """Where it starts, (1, nstate)."""
+    draws: list[Any]
+    seconds: float
+    """Of wall time, to assemble it."""
+
+    @classmethod
+    def of(cls, members: Population, number: int) -> "_Member":
+        began = time.perf_counter()
+        assembly, draws = members.member(number)
+        physics = initial_physics(assembly, 1)
+        return cls(number, assembly, physics, draws, time.perf_counter() - began)
+
+
 def log_of(out: Path, member: int) -> Path:
     """Return where the member's log is in the folder of its campaign."""
     return out / "logs" / f"{member:06d}" / LOG
@@ -73,10 +89,15 @@ def fly_members(call: Call) -> list[Flown]:
         OSError: a log cannot be written.
     """
     members = same(call.campaign, call.identity)
-    if together(members):
-        flown = _batch(members, call.members)
-    else:
-        flown = [_alone(members, number) for number in call.members]
+    flown: list[Flown] = []
+    group: list[_Member] = []
+    for number in call.members:
+        member = _Member.of(members, number)
+        if group and not alike(group[0].assembly, member.assembly):
+            flown += _side_by_side(group)
+            group = []
+        group.append(member)
+    flown += _side_by_side(group)
     for one in flown:
         if call.keep == "all" or (call.keep == "failures" and not one.passed):
             _keep_log(members, one, log_of(call.out, one.member))
@@ -102,42 +123,22 @@ def _same(campaign: Campaign, identity: str, alike: bool) -> Population:
     return members
 
 
-def together(members: Population) -> bool:
-    """Return whether the members may fly in one batch: only their initial states differ.
-
-    In gravity an engine's first thrust depends on the place.
-    """
-    keys = {each.key.partition("[")[0] for each in members.dispersions}
-    at_place = members.scenario.environment.gravity is not None and "initial.position" in keys
-    return keys <= STARTS and not at_place
-
-
-def _alone(members: Population, number: int) -> Flown:
+def _side_by_side(group: Sequence[_Member]) -> list[Flown]:
+    """Fly members that are ``alike``; where one has to end early, again in two halves."""
     began = time.perf_counter()
-    assembly, draws = members.member(number)
-    start = start_at(assembly, initial_physics(assembly, 1), [number])
-    (verdicts,), trouble = judged(assembly, start, [number])
-    return Flown(number, draws, verdicts, trouble, time.perf_counter() - began)
-
-
-def _batch(members: Population, numbers: Sequence[int]) -> list[Flown]:
-    """Fly the members in one batch; where one has to end early, again in two halves."""
-    began = time.perf_counter()
-    draws, physics = [], []
-    for number in numbers:
-        assembly, drawn = members.member(number)
-        draws.append(drawn)
-        physics.append(initial_physics(assembly, 1))
-    # Nothing but these rows differs, so that the last member's assembly does for all.
-    start = start_at(assembly, np.concatenate(physics), numbers)
-    verdicts, trouble = judged(assembly, start, numbers)
-    if trouble and len(numbers) > 1:
-        half = len(numbers) // 2
-        return _batch(members, numbers[:half]) + _batch(members, numbers[half:])
-    share = (time.perf_counter() - began) / len(numbers)
+    first, numbers = group[0].assembly, [each.number for each in group]
+    start = start_at(first, np.concatenate([each.physics for each in group]), numbers)
+    if any(each.assembly.vehicle is not first.vehicle for each in group):
+        models = [each.assembly.vehicle.model for each in group]
+        start = replace(start, models=models)
+    verdicts, trouble = judged(first, start, numbers)
+    if trouble and len(group) > 1:
+        half = len(group) // 2
+        return _side_by_side(group[:half]) + _side_by_side(group[half:])
+    share = (time.perf_counter() - began) / len(group)
     return [
-        Flown(number, drawn, judged, trouble, share)
-        for number, drawn, judged in zip(numbers, draws, verdicts, strict=True)
+        Flown(each.number, each.draws, judged, trouble, each.seconds + share)
+        for each, judged in zip(group, verdicts, strict=True)
     ]
 
 

@@ -126,12 +126,22 @@ class Population:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the scenario's own have been shown
                 scenario = validated(table, str(self.path), self.origins)
-                assembly = assemble(scenario, self.path.parent, trust=self.campaign.trust)
+                vehicle = self._same_vehicle(scenario)
+                assembly = assemble(
+                    scenario, self.path.parent, trust=self.campaign.trust, vehicle=vehicle
+                )
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
+        written = plain(assembly.scenario.model_dump(mode="python"))
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
-            require_arrival(assembly, dispersion, value, name)
+            require_arrival(assembly, written, dispersion, value, name)
         return assembly
+
+    def _same_vehicle(self, scenario: Scenario) -> Any:
+        """Return the nominal vehicle; None if that of the ``scenario`` is another."""
+        parts = ("plant", "environment", "rates")
+        same = all(getattr(scenario, part) == getattr(self.scenario, part) for part in parts)
+        return self.nominal.vehicle if same else None
 
 
 def population(campaign: Campaign, *, alike: bool = False) -> Population:
@@ -191,13 +201,17 @@ def put(table: Any, written: Any, path: Sequence[str], value: Any) -> None:
     place[int(last) if isinstance(place, list) else last] = value
 
 
-def require_arrival(assembly: Assembly, dispersion: Dispersion, drawn: Any, name: str) -> None:
+def require_arrival(
+    assembly: Assembly, written: Any, dispersion: Dispersion, drawn: Any, name: str
+) -> None:
     """Read the value back from what is to fly, and refuse another than was drawn.
+
+    ``written`` is the assembly's scenario with every default written out.
 
     Raises:
         FlightError: with the key and both values.
     """
-    flown = value_at(plain(assembly.scenario.model_dump(mode="python")), dispersion.path)
+    flown = value_at(written, dispersion.path)
     period = _unit(dispersion) == "Hz" and flown == 1.0 / drawn
     arrived = flown == drawn or period
     name, _, index = dispersion.key.partition("[")

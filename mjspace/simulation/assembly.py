@@ -152,11 +152,12 @@ def assemble(
     *,
     trust: bool = False,
     law_folder: Path | None = None,
+    vehicle: Vehicle | None = None,
 ) -> Assembly:
     """Return the scenario's assembly; ``folder`` holds the files that it names.
 
     With ``trust`` it may name files elsewhere and any installed module: see ``Trust``. A law from
-    ``law_folder``, where there is one, is trusted.
+    ``law_folder``, where there is one, is trusted. The ``vehicle`` is built, unless it is given.
 
     Raises:
         InputError: a part cannot be built, with the scenario's key and what would be right.
@@ -186,9 +187,8 @@ def assemble(
         sources |= {f"{MODEL}/{name}": content for name, content in model.files.items()}
         flown["plant"] = scenario.plant.model_copy(update={"model": f"{MODEL}/{model.main}"})
     size = userdata_size(scenario.environment, scenario.plant)
-    vehicle = _part(
-        "plant", partial(build, userdata=size, source=model), scenario.plant, scenario.rates
-    )
+    built = partial(build, userdata=size, source=model)
+    vehicle = vehicle or _part("plant", built, scenario.plant, scenario.rates)
     facts = facts_of(vehicle, scenario)
     law, flown["law"] = _component("law", scenario.law, facts, of_law, sources)
     facts["ephemeris"] = KnownEphemeris(scenario.environment)  # of a reference alone

@@ -53,6 +53,7 @@ class CompiledFlight:
         # Threads that write masses, and derive what follows from them, have models of their own.
         own = {each.array for each in period.masses} | ({"bvh_aabb"} if period.masses else set())
         self._batch = NativeBatch(assembly.vehicle.model, vehicles, threads, start.model, own)
+        self._batch.set_models(start.models)
         self._suite = assembly.sensors(members)
         self.physics = self._batch.state
         named = (period.memory, period.sensors, period.constants)

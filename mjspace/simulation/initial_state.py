@@ -38,6 +38,9 @@ class Start:
     """What actuators and step effects remember at the period's start."""
     model: dict[str, Array] = field(default_factory=dict)
     """Fields of MuJoCo's model in which the vehicles differ, (N, ...)."""
+    models: Sequence[Any] = ()
+    """Or a compiled model of each vehicle, of the sizes of the assembly's; step effects that change
+    a model's fields cannot fly with them."""
 
 
 def last_period(scenario: Scenario) -> int:

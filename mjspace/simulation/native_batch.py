@@ -8,7 +8,7 @@ import ctypes
 import functools
 import sys
 import weakref
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,7 @@ def library() -> ctypes.CDLL:
         ("mjb_warning", pointer, [pointer]),
         ("mjb_expand", pointer, [pointer, text, pointer, pointer]),
         ("mjb_setConst", count, [pointer, pointer, count]),
+        ("mjb_setModels", None, [pointer, pointer]),
         ("mjb_apply", count, [pointer, pointer, count, pointer, pointer, count]),
         ("mjb_status", pointer, [pointer]),
         ("mjb_error", text, [pointer, count]),
@@ -124,6 +125,16 @@ class NativeBatch:
             self._fields[name][...] = values
         if changed:
             self._check(library().mjb_setConst(self._batch, None, 0))
+
+    def set_models(self, models: Sequence[Any]) -> None:
+        """Let each simulation have its own of the ``models``, which have the sizes of the batch's.
+
+        Nothing changes where there are none. It excludes ``fields`` and ``own`` ones.
+        """
+        self._models = tuple(models)  # which the batch reads
+        if models:
+            addresses = (ctypes.c_void_p * self.vehicles)(*(each._address for each in models))
+            library().mjb_setModels(self._batch, addresses)
 
     def apply(self, function: int, argument: int) -> None:
         """Call the C ``function`` at that address on each simulation, then save its state.

@@ -55,6 +55,8 @@ class Stepper:
             self.batch.expand(name)[:] = values
         if start.model:
             self.batch.set_const()
+        if start.models:
+            self.batch.set_models(start.models)
         self._sensordata = self.batch.bind("sensordata")
         bus = bus_id(assembly.vehicle.model)
         self._on_bus = self.batch.bind("xfrc_applied")[:, bus]  # force and torque, inertial axes

@@ -96,10 +96,12 @@ def _sleep(model: Any) -> Iterator[str]:
 
 
 def _armature(model: Any) -> Iterator[str]:
+    armatures = "dof_armature", "actuator_armature", "tendon_armature"
+    if not any(getattr(model, name).any() for name in armatures):
+        return
     bare = copy.copy(model)
-    bare.dof_armature[:] = 0.0
-    bare.actuator_armature[:] = 0.0
-    bare.tendon_armature[:] = 0.0
+    for name in armatures:
+        getattr(bare, name)[:] = 0.0
     with_it, without = np.diag(mass_matrix(model)), np.diag(mass_matrix(bare))
     for dof in np.flatnonzero(with_it != without):
         share = 1.0 - without[dof] / with_it[dof]

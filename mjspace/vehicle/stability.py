@@ -45,11 +45,7 @@ def linearized(model: Any) -> Linear | None:
     """Return the model about its initial position, at rest; None beyond ``LARGEST`` dofs."""
     if not 0 < model.nv <= LARGEST:
         return None
-    free = copy.copy(model)
-    # Limits of forces do not affect the slopes.
-    free.actuator_forcelimited[:] = 0
-    free.jnt_actfrclimited[:] = 0
-    free.tendon_actfrclimited[:] = 0
+    free = _without_limits(model)
     data = mujoco.MjData(free)
     rest = data.qpos.copy()
 
@@ -66,6 +62,17 @@ def linearized(model: Any) -> Linear | None:
         for at in (lambda nudge: (nudge, still), lambda nudge: (still, nudge))
     )
     return Linear(mass_matrix(model), damping, stiffness)
+
+
+def _without_limits(model: Any) -> Any:
+    """Return the model without limits of forces, which do not affect the slopes."""
+    limits = "actuator_forcelimited", "jnt_actfrclimited", "tendon_actfrclimited"
+    if not any(getattr(model, name).any() for name in limits):
+        return model  # a copy, with its pictures, takes as long as all that follows
+    free = copy.copy(model)
+    for name in limits:
+        getattr(free, name)[:] = 0
+    return free
 
 
 def growing(linear: Linear, step: float) -> Mode | None:

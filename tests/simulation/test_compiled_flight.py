@@ -229,6 +229,24 @@ def test_vehicles_may_have_models_of_their_own() -> None:
     assert compiled.bits(0)["/state.physics"] == flown(built).bits(0)["/state.physics"]
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_vehicles_may_have_whole_models_of_their_own(threads: int) -> None:
+    """With friction that MuJoCo solves for: its solver stops at what the model's masses tell it."""
+    built = assembly("detumble-wheels", "duration=0.5")
+    inertia = (f"plant.gyrostat_inertia=[[10,0,0],[0,{y},0],[0,0,14]]" for y in (11, 12, 13))
+    each = [assembly("detumble-wheels", "duration=0.5", one) for one in inertia]
+    for one in (built, *each):
+        one.vehicle.model.dof_frictionloss[one.vehicle.wheel_dof] = 0.02
+    models, members = [one.vehicle.model for one in each], (0, 1, 2)
+    start = dataclasses.replace(first_start(built, members), models=models)
+    compiled = flown(built, members, start=start, threads=threads)
+    assert compiled.compiled == WHOLE
+    assert_same(compiled, flown(built, members, start=start, compiled=False))
+    for vehicle, one in enumerate(each):
+        assert compiled.bits(vehicle) == flown(one).bits(0)
+    assert compiled.bits(0) != compiled.bits(1)
+
+
 HEAD = """
 from typing import NamedTuple
 import numpy as np
