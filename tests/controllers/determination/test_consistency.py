@@ -68,7 +68,7 @@ def flown(name: str, *overrides: str) -> Flown:
     def rows(topic: str, field: str) -> Array:
         return np.concatenate([block.rows[topic][field] for block in blocks])
 
-    bias = built.sensors(members).constants["rate"] + rows("/state", "sensor_rate_walk")
+    bias = built.sensors(members).constants["rate_bias"] + rows("/state", "sensor_rate_walk")
     error = rows("/truth", "estimation_error"), bias - rows("/estimate", "gyro_bias")
     return Flown(
         np.concatenate(error, axis=-1),
