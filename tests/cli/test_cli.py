@@ -46,8 +46,8 @@ def test_help_and_list() -> None:
         assert description
     assert lines.startswith("arms:\n  arm-reaction ")
     assert "\nlanding:\n  lander " in lines
-    some = json.loads(mjspace("list", "Lander", "printed", "--json").stdout)
-    assert list(some) == ["lander-printed"]
+    some = json.loads(mjspace("list", "Lander", "crater", "--json").stdout)
+    assert list(some) == ["lander-craters", "lander-divert"]
     none = mjspace("list", "warp")
     assert (none.returncode, none.stderr) == (2, "mjspace: list: no scenario says 'warp'\n")
 

@@ -85,12 +85,28 @@ def test_the_disturbance_of_a_log_needs_trust_under_another_law_too(
 
 
 def test_a_module_named_in_a_log_is_not_imported(flown: Path, tmp_path: Path) -> None:
+    own = Log(flown).attachment("scenario.toml").decode()
     for kind in ("os:system", "/etc/x.py:Law", "../x.py:Law"):
-        scenario = Log(flown).attachment("scenario.toml").decode().replace("law.py:Still", kind)
-        attachments = {"scenario.toml": scenario.encode()}
-        path = rewritten(flown, tmp_path / "x.mcap", attachments=attachments)
-        with pytest.raises(InputError):
-            verify(path)
+        as_estimator = f'{own}\n[estimator]\nkind = "{kind}"\n'
+        for scenario in (own.replace("law.py:Still", kind), as_estimator):
+            attachments = {"scenario.toml": scenario.encode()}
+            path = rewritten(flown, tmp_path / "x.mcap", attachments=attachments)
+            with pytest.raises(InputError):
+                verify(path)
+
+
+def test_the_estimator_of_a_log_is_trusted_no_more_than_its_law(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Under another law too; and ``info`` runs nothing."""
+    own = Log(flown).attachment("scenario.toml").decode().replace("disturbance.py:push", "")
+    law, told = "quaternion_feedback:RateDamping", r"no module 'os'|runs code out of the log"
+    scenario = f'{own}\n[estimator]\nkind = "os:system"\n'
+    path = rewritten(flown, tmp_path / "x.mcap", attachments={"scenario.toml": scenario.encode()})
+    assert "scenario        x" in info(path, capsys=capsys)
+    with pytest.raises(InputError, match=told):
+        replay(path, tmp_path / "out", law=law, gains=["rate_gain=1"])
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_attachment_stays_in_its_folder(tmp_path: Path) -> None:

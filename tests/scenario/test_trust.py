@@ -24,6 +24,7 @@ class Law:
 
 TABLES = {
     "law": '[law]\nkind = "{}"\n',
+    "estimator": '[estimator]\nkind = "{}"\n',
     "reference": '[reference]\nkind = "{}"\n',
     "disturbance": '[environment]\npython = "{}"\n',
     "inner": '[law]\nkind = "phases:Phases"\n[[law.phases]]\nname = "a"\nlaw = {{ kind = "{}" }}\n',
