@@ -9,8 +9,6 @@ import pytest
 from mjspace import attitude as att
 from mjspace.environment import sun
 from mjspace.environment.constants import ASTRONOMICAL_UNIT
-from mjspace.environment.constants import RADIUS as BODY_RADIUS
-from mjspace.environment.shadow import visible_from
 from mjspace.errors import InputError
 from mjspace.scenario.loading import load
 from mjspace.sensors.base import Motion, Surroundings
@@ -58,7 +56,6 @@ def moving(place: np.ndarray) -> Motion:
         magnetic_field=lambda time: np.broadcast_to(FIELD, (len(time), 3)),
         sun_position=lambda time: np.broadcast_to(SUN, (len(time), 3)),
         orbit_position=lambda time: place,
-        sunlight=lambda place, sun: visible_from(place, sun, BODY_RADIUS["earth"], 1.0),
     )
     q = att.normalize(draw.normal(size=(count, 4)))
     return Motion(np.zeros(count), q, none, none, none, none, around)
