@@ -122,7 +122,7 @@ class CompiledFlight:
         # The same for every vehicle, and of each its own.
         rows = [np.ascontiguousarray(array[:count])[:, None] for array in desired]
         times = (first + np.arange(count, dtype=float)) * self._assembly.scenario.rates.control
-        known = [effect.known(times)[:, None] for effect in self._effects]
+        known = [np.ascontiguousarray(each.known(times))[:, None] for each in self._effects]
         inputs = (
             (*period.reference, *period.draws.values(), *period.known),
             (*rows, *draws.values(), *known),
