@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 
 from mjspace.campaign import draws, robustness
-from mjspace.campaign.flights import judged, same
+from mjspace.campaign.flights import judged_alone, same
 from mjspace.campaign.members import Campaign, Population, population
 from mjspace.campaign.search import minimize
 from mjspace.campaign.written import write_scenario
 from mjspace.contract import Array
 from mjspace.errors import FlightError, InputError
-from mjspace.interrupts import on_signals
+from mjspace.interrupts import Interrupted, on_signals
 from mjspace.runner import workers
 from mjspace.runner.output import LOG
 from mjspace.runner.run import Result, fly_to_log
-from mjspace.simulation.initial_state import first_start
 
 EDGE = 0.00135
 """Probability that is left out at either end of what is drawn: three sigma of a normal one."""
@@ -73,6 +72,7 @@ def falsify(
     Raises:
         InputError: bad input, in one line; or the scenario fails as it is.
         FlightError: a process was killed.
+        Interrupted: a signal ended it before anything was flown.
     """
     members = population(campaign)
     if not members.dispersions:
@@ -83,9 +83,11 @@ def falsify(
     module = __name__
     with on_signals() as stop, workers.team(module, stop, processes) as make:
         search = _Search(campaign, members, make, told)
-        nominal, *_ = search.fly([own])
-        if nominal.margin < 0.0:
-            raise InputError(f"{members.path}: fails as it is: {nominal.why}")
+        flown = search.fly([own])
+        if not flown:
+            raise Interrupted(stop.signal)
+        if flown[0].margin < 0.0:
+            raise InputError(f"{members.path}: fails as it is: {flown[0].why}")
         width = draws.width_of(members.dispersions)
         for _ in minimize(search.values, width, campaign.count, members.scenario.seed):
             if stop() or (search.failed and not go_on):
@@ -177,13 +179,14 @@ def _fly(argument: tuple[Campaign, dict[str, Any], list[Any]]) -> tuple[float, s
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             assembly = members.built(chosen, "a flight of the search")
-            (verdicts,), trouble = judged(assembly, first_start(assembly, [0]), [0])
+            verdicts, trouble = judged_alone(assembly)
     except FlightError as error:
         return -inf, str(error)
     if trouble:
         return -inf, trouble
-    worst = min(verdicts, key=lambda verdict: robustness.of_flight([verdict], ""))
-    return robustness.of_flight(verdicts, trouble), worst.line
+    margins = [robustness.of_flight([verdict]) for verdict in verdicts]
+    least = min(margins)
+    return least, verdicts[margins.index(least)].line
 
 
 def write(members: Population, found: Candidate, folder: Path) -> Result:

@@ -20,7 +20,7 @@ from mjspace.runner.checks import Judge, Verdict
 from mjspace.runner.output import LOG
 from mjspace.runner.run import fly_to_log, refuse_unjudgeable
 from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.initial_state import Start, initial_physics, start_at
+from mjspace.simulation.initial_state import Start, first_start, initial_physics, start_at
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import one_vehicle, shapes
 
@@ -140,6 +140,17 @@ def _side_by_side(group: Sequence[_Member]) -> list[Flown]:
         Flown(each.number, each.draws, judged, trouble, each.seconds + share)
         for each, judged in zip(group, verdicts, strict=True)
     ]
+
+
+def judged_alone(assembly: Assembly, member: int = 0) -> tuple[list[Verdict], str]:
+    """Fly one member from its start and return its verdicts, and why the flight ended early.
+
+    Raises:
+        InputError: a check names no signal of the flight.
+        FlightError: it cannot begin.
+    """
+    (verdicts,), trouble = judged(assembly, first_start(assembly, [member]), [member])
+    return verdicts, trouble
 
 
 def judged(

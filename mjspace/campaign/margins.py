@@ -6,15 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from mjspace.campaign.flights import judged
+from mjspace.campaign.flights import judged_alone
 from mjspace.campaign.perturbations import KINDS, Nominal
 from mjspace.campaign.requirement import requirement
 from mjspace.errors import FlightError, InputError, nearest
-from mjspace.interrupts import on_signals
+from mjspace.interrupts import Interrupted, on_signals
 from mjspace.runner import workers
 from mjspace.scenario.loading import read, validated
 from mjspace.simulation.assembly import Assembly, assemble
-from mjspace.simulation.initial_state import first_start
 
 Told = Callable[[int, int], None]
 """A function that is called with how many of all margins are found."""
@@ -108,6 +107,7 @@ def find(
     Raises:
         InputError: bad input, in one line; or the scenario fails as it is.
         FlightError: a process was killed.
+        Interrupted: a signal ended it.
     """
     for key in keys:
         if key not in KINDS:
@@ -125,6 +125,8 @@ def find(
         for index, margin in workers.each(calls, stop, processes):
             found[index] = margin
             told(len(found), 0)
+        if stop():  # a margin that was broken off is none
+            raise Interrupted(stop.signal)
     return [found[index] for index in sorted(found)]
 
 
@@ -179,7 +181,7 @@ def _failure(assembly: Assembly) -> str:
         InputError: a check is of a signal that there is not.
         FlightError: it cannot begin.
     """
-    (verdicts,), trouble = judged(assembly, first_start(assembly, [0]), [0])
+    verdicts, trouble = judged_alone(assembly)
     failed = next((each for each in verdicts if not each.as_expected), None)
     if failed is None or trouble:
         return trouble

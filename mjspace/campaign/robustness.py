@@ -21,7 +21,7 @@ def relative(check: Check, margins: Array) -> Array:
     return np.where(np.isnan(margins), -inf, sign * margins / (size or 1.0))
 
 
-def of_flight(verdicts: Sequence[Verdict], trouble: str) -> float:
+def of_flight(verdicts: Sequence[Verdict], trouble: str = "") -> float:
     """Return the least relative margin of a flight; -inf where it ended early."""
     if trouble or not verdicts:
         return -inf

@@ -11,19 +11,18 @@ from typing import Any
 import numpy as np
 
 from mjspace.campaign import robustness
-from mjspace.campaign.flights import judged, same
+from mjspace.campaign.flights import judged_alone, same
 from mjspace.campaign.members import Campaign, population, value_at
 from mjspace.campaign.requirement import objective, requirement
 from mjspace.campaign.search import minimize
 from mjspace.campaign.written import write_scenario
 from mjspace.contract import Array
 from mjspace.errors import FlightError, InputError, input_error_at
-from mjspace.interrupts import on_signals
+from mjspace.interrupts import Interrupted, on_signals
 from mjspace.runner import workers
 from mjspace.scenario.dispersions import path_of
 from mjspace.scenario.loading import validated
 from mjspace.simulation.assembly import assemble
-from mjspace.simulation.initial_state import initial_physics, start_at
 from mjspace.units import to_si
 
 WORSE = 1e9
@@ -99,7 +98,6 @@ class Tuned:
     better: int
     """Draws of those in which the objective is less after."""
     flights: int
-    signal: int = 0
 
 
 def varied(text: str) -> Varied:
@@ -139,6 +137,7 @@ def tune(
     Raises:
         InputError: bad input, in one line.
         FlightError: a process was killed.
+        Interrupted: a signal ended it; nothing has been tuned.
     """
     members = population(campaign, alike=True)
     draws = draws if members.dispersions else 1
@@ -166,18 +165,23 @@ def tune(
             trials.update(zip((tuple(c.values()) for c in chosen), means.tolist(), strict=True))
             return means
 
-        if not np.isfinite(flying.fly([({}, 0)])).all():
+        nominal = flying.fly([({}, 0)])
+        if stop():
+            raise Interrupted(stop.signal)
+        if not np.isfinite(nominal).all():
             raise InputError(f"{members.path}: {goal.minimized} is not a number")
         search = minimize(evaluate, len(what), campaign.count, members.scenario.seed, patience=None)
         for _ in search:
             if stop():
-                break
+                raise Interrupted(stop.signal)
         best = min(trials, key=lambda key: trials[key])
         values = dict(zip((each.key for each in what), best, strict=True))
         others = range(draws, draws + (fresh if members.dispersions else 0)) or first
         before, after = (
             flying.fly([(chosen, number) for number in others]) for chosen in ({}, values)
         )
+        if stop():
+            raise Interrupted(stop.signal)
     return Tuned(
         values=values,
         own=own,
@@ -185,7 +189,6 @@ def tune(
         after=_shown(after),
         better=int(np.sum(after < before)),
         flights=flying.count,
-        signal=stop.signal,
     )
 
 
@@ -225,14 +228,13 @@ def _objective(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             assembly, _ = changed.member(number)
-            start = start_at(assembly, initial_physics(assembly, 1), [number])
-            (verdicts,), trouble = judged(assembly, start, [number])
+            verdicts, trouble = judged_alone(assembly, number)
     except FlightError:
         return 10.0 * WORSE
     if trouble:
         return 10.0 * WORSE
     value, *required = verdicts
-    margin = robustness.of_flight(required, "") if required else 0.0
+    margin = robustness.of_flight(required) if required else 0.0
     if math.isnan(value.measured) or margin < 0.0:
         return WORSE * (1.0 + min(-margin, 8.0))
     return value.measured

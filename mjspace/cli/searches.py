@@ -51,11 +51,9 @@ def falsify(
     with cause_shown(traceback), count_bar(count, "flying") as told:
         found = search(what, go_on=go_on, processes=workers, told=told)
     result = None if found.minimal is None else write(members, found.minimal, folder)
-    rows = []
-    for place, dispersion in enumerate(members.dispersions):
-        minimal = None if found.minimal is None else found.minimal.draws[place]
-        own = nominal_draws(members)[place]
-        rows.append((dispersion.key, own, found.worst.draws[place], minimal))
+    keys = [dispersion.key for dispersion in members.dispersions]
+    minimal = [None] * len(keys) if found.minimal is None else found.minimal.draws
+    rows = list(zip(keys, nominal_draws(members), found.worst.draws, minimal, strict=True))
     if as_json:
         print(json.dumps(_data(found, rows, None if result is None else folder), indent=2))
     else:
@@ -170,7 +168,6 @@ def tune(
         print(json.dumps({**dataclasses.asdict(found), "out": str(path)}, indent=2))
     else:
         _show_tuned(found, minimized, path)
-    raise typer.Exit(128 + found.signal if found.signal else 0)
 
 
 def _show_tuned(found: Any, minimized: str, path: Path) -> None:
