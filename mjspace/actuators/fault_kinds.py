@@ -1,5 +1,6 @@
 """Kinds of fault: what each makes of what an actuator should apply."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar
@@ -23,6 +24,8 @@ class FaultKind(ABC):
     """Whether it draws random numbers."""
     remembers_begin: ClassVar[bool] = False
     """Whether what it remembers stays, while it is in force, what it was when it began."""
+    remembers_faulty: ClassVar[bool] = False
+    """Whether it remembers, while it is in force, what the motors applied, not what they should."""
 
     def memory(self, value: float, hold: float, key: str) -> int:
         """Return how many applied values, of ``hold`` [s] each, are remembered.
@@ -31,6 +34,10 @@ class FaultKind(ABC):
             ValueError: the value does not fit ``hold``; ``key`` is the value's in the scenario.
         """
         return 0
+
+    def per_hold(self, value: float, hold: float) -> float:
+        """Return what ``faulty`` is given as the value, where values are held for ``hold`` [s]."""
+        return value
 
     @abstractmethod
     def faulty(self, right: Array, value: float, oldest: Array, noise: Noise) -> Array:
@@ -103,6 +110,26 @@ class Delayed(FaultKind):
         return oldest
 
 
+class Lagged(FaultKind):
+    """A motor that follows slowly: y' = (u - y) / T with u held, applied as y is at the end."""
+
+    applies = "what it should, behind a first-order lag with a time constant of ``value`` seconds"
+    is_positive = True
+    remembers_faulty = True
+
+    def memory(self, value: float, hold: float, key: str) -> int:
+        """Remember the last value."""
+        return 1
+
+    def per_hold(self, value: float, hold: float) -> float:
+        """Return the part of a difference that is left after a hold."""
+        return math.exp(-hold / value)
+
+    def faulty(self, right: Array, value: float, oldest: Array, noise: Noise) -> Array:
+        """Return the last value, nearer to the right one."""
+        return right + value * (oldest - right)
+
+
 class Noisy(FaultKind):
     """A motor with white noise."""
 
@@ -121,6 +148,7 @@ KINDS: dict[str, FaultKind] = {
     "biased": Biased(),
     "scaled": Scaled(),
     "delayed": Delayed(),
+    "lagged": Lagged(),
     "noisy": Noisy(),
 }
 """By the name in a scenario: a line registers each."""

@@ -107,7 +107,7 @@ class _Motor:
     """A fault of motors."""
 
     kind: FaultKind
-    value: float
+    value: float  # for the kind, of a hold
     place: _Place
     length: int  # of what is remembered
     noise: Callable[[int], Array]
@@ -164,7 +164,8 @@ class FaultSet:
             place, key, kind = known[fault.motor], f"faults.{number}.value", KINDS[fault.kind]
             length = kind.memory(fault.size, hold, key)
             noise = normals(seed, members, (STREAM + number,), place.width)
-            self._motors[number] = _Motor(kind, fault.size, place, length, noise)
+            value = kind.per_hold(fault.size, hold)
+            self._motors[number] = _Motor(kind, value, place, length, noise)
 
     def reset(self) -> State:
         """Return the state at the start.
@@ -269,7 +270,8 @@ class FaultSet:
             wrong = self._faulty(motor, right, past, now)
             in_force = state[PHASE][:, number] == _IN_FORCE
             if past is not None:
-                newest = np.concatenate([past[..., 1:], right[..., None]], axis=-1)
+                last = np.where(in_force[:, None], wrong, right) if kind.remembers_faulty else right
+                newest = np.concatenate([past[..., 1:], last[..., None]], axis=-1)
                 keeps = in_force & kind.remembers_begin
                 state[field] = np.where(keeps[:, None, None], past, newest)
             changed = result[place.kind].copy()

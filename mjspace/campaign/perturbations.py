@@ -79,6 +79,26 @@ class Delay(Perturbation):
         return _with_faults(nominal, "delayed", self.value(nominal, step))
 
 
+class Lag(Perturbation):
+    """All actuators follow with a first-order lag, beside what their own models have."""
+
+    name = "time constant of a lag of all actuators"
+    unit = "s"
+    most = 1e6
+
+    def applies(self, nominal: Nominal) -> bool:
+        """Return whether there are any."""
+        return bool(nominal.assembly.actuators.kinds)
+
+    def value(self, nominal: Nominal, step: float) -> float:
+        """Return the time constant [s]."""
+        return step * nominal.assembly.hold
+
+    def change(self, nominal: Nominal, step: float) -> Change:
+        """Return the table with a fault of every kind of actuator."""
+        return _with_faults(nominal, "lagged", self.value(nominal, step))
+
+
 @dataclass(frozen=True)
 class _Factor(Perturbation):
     """What is nominal is multiplied by 1 + step, or divided by it."""
@@ -175,6 +195,7 @@ class Noise(Perturbation):
 
 KINDS: dict[str, Perturbation] = {
     "delay": Delay(),
+    "lag": Lag(),
     "gain-up": Gain("gain increased to"),
     "gain-down": Gain("gain reduced to", divides=True),
     "inertia-up": Inertia("the law's inertia increased to"),

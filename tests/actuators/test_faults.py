@@ -82,6 +82,16 @@ def test_a_delayed_motor_gives_nothing_until_the_delay_has_passed() -> None:
     assert rows[:, 0, 1].tolist() == [0.0, 0.0, 0.0, *RIGHT[:-3, 1]]
 
 
+def test_a_lagged_motor_follows_a_first_order_lag_from_what_it_last_applied() -> None:
+    """Between instants y' = (u - y) / T with u held: y goes the part 1 - e^(-h / T) of the way."""
+    rows, _ = given(kind="lagged", value="250 ms", at="350 ms", until="800 ms")
+    expected = RIGHT.copy()
+    for k in range(4, 8):
+        left = expected[k - 1, 1] - RIGHT[k, 1]
+        expected[k, 1] = RIGHT[k, 1] + left * np.exp(-HOLD / 0.25)
+    np.testing.assert_allclose(rows[:, 0], expected, rtol=1e-14)
+
+
 def test_a_fault_that_is_over_before_its_signal_begins_never() -> None:
     table = {"motor": "wheel_1", "kind": "dead", "until": 0.2}
     table["when"] = {"signal": "truth.rate", "above": 1.0}

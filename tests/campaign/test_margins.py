@@ -45,6 +45,28 @@ def test_the_delay_that_is_survived_is_that_of_the_closed_form(scenario: str) ->
     assert bounds(found) == pytest.approx((0.5 * most, 0.5 * (most + 1)), rel=1e-12)
 
 
+def settled_behind_a_lag(time_constant: float) -> bool:
+    """Tell of the integrator's recurrence whether its rate is below 0.001 rad/s from 250 s on."""
+    left = math.exp(-0.5 / time_constant)
+    rate, applied, late = 0.01, 0.0, []
+    for k in range(601):
+        if k >= 500:
+            late.append(abs(rate))
+        applied = rate + left * (applied - rate)
+        rate -= FED_BACK * applied
+    return max(late) < 0.001
+
+
+@pytest.mark.usefixtures("here")
+def test_the_lag_that_is_survived_is_that_of_the_recurrence(scenario: str) -> None:
+    """No lag makes it unstable: its oscillation decays as e^(-t / 2 T), too slowly at last."""
+    require = "max(truth.rate) < 0.001 rad/s from 250 s"
+    low, high = bounds(margins(scenario, "lag", require=require)["lag"])
+    assert low < high < 1.06 * low
+    assert settled_behind_a_lag(low)
+    assert not settled_behind_a_lag(high)
+
+
 @pytest.mark.usefixtures("here")
 def test_gain_and_sampling_are_survived_up_to_the_closed_form(scenario: str) -> None:
     """Without delay the integrator is stable for a < 2, with the gain or the period n-fold."""

@@ -75,10 +75,11 @@ SCENARIOS = {
         [
             "duration=2",
             "faults=[{motor='wheel_1',kind='dead',at=0.51,until=1.3},"
-            "{motor='wheel_torque',kind='delayed',value=0.1,at=1.0}]",
+            "{motor='wheel_torque',kind='delayed',value=0.1,at=1.0},"
+            "{motor='wheel_0',kind='lagged',value=0.1,at=0.7}]",
         ],
         "the faults",
-        3,
+        4,
     ),
     "dead, and its power": (
         "wheel-failure",
