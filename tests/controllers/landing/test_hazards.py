@@ -25,12 +25,9 @@ def land(seed: int, shape: tuple[int, int] = (31, 37)) -> Array:
 
 def fitted(heights: Array, i: int, j: int) -> tuple[float, float]:
     """Return slope and roughness at a point, by least squares over its disc."""
-    points = [
-        (SPACING * (c - j), SPACING * (r - i), heights[r, c])
-        for r, c in np.ndindex(heights.shape)
-        if np.hypot(r - i, c - j) * SPACING <= FOOTPRINT
-    ]
-    x, y, z = np.array(points).T
+    r, c = np.indices(heights.shape)
+    near = SPACING * np.hypot(r - i, c - j) <= FOOTPRINT
+    x, y, z = SPACING * (c - j)[near], SPACING * (r - i)[near], heights[near]
     matrix = np.column_stack([x, y, np.ones_like(x)])
     plane = np.linalg.lstsq(matrix, z, rcond=None)[0]
     return np.arctan(np.hypot(*plane[:2])), np.abs(z - matrix @ plane).max()

@@ -36,6 +36,7 @@ def test_the_papers_descent_with_a_hover_lands() -> None:
     assert flight.time[far].max() == pytest.approx(87.0, abs=0.5)
 
 
+@pytest.mark.long
 def test_the_cubic_descent_lands_straight() -> None:
     flight = fly(LANDS, CubicDescent(clearance=1.0), duration=310.0, ground=0.0)
     assert speeds(flight) == pytest.approx((0.56, 0.002), abs=0.005)
@@ -44,6 +45,7 @@ def test_the_cubic_descent_lands_straight() -> None:
     assert flight.propellant[-1] == pytest.approx(16.0, abs=0.05)
 
 
+@pytest.mark.long
 def test_the_slower_loop_lands_behind_lags_and_loses_mass() -> None:
     vehicle = Vehicle(depletes=1.0, thrust_lag=0.1, gimbal_lag=0.05, gimbal_rate=np.radians(20.0))
     flight = fly(LANDS_BEHIND_LAGS, HOVERING, duration=230.0, vehicle=vehicle, ground=0.0)
