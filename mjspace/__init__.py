@@ -21,7 +21,7 @@ __version__ = "0.1.0"
 
 # None of these names is one of a module or a package of mjspace: importing that would replace it.
 _MODULES = {
-    "Log": "mjspace.log.reader",
+    "Log": "mjspace.runner.shown_log",
     "compare": "mjspace.log.compare",
     "convert": "mjspace.log.convert",
     "figure": "mjspace.plotting.page",

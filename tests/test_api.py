@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import mjspace
-from mjspace.errors import NoRendererError
+from mjspace.errors import InputError, NoRendererError
 
 SHORT = ("duration=0.05", "checks=[]")
 ROOMS = [path.stem for path in Path(mjspace.__file__).parent.iterdir()]
@@ -34,6 +34,35 @@ def test_a_flight_is_read_as_the_pages_say(flown: Path) -> None:
     assert truth["attitude_error"].shape == (11, 1)
     assert np.degrees(truth["attitude_error"].max()) > 0.0
     assert np.abs(truth["wheel_speed"]).max() > 0.0
+
+
+def test_a_topic_is_a_table_with_units(flown: Path) -> None:
+    log = mjspace.Log(flown)
+    rows = log.read("/truth", ["wheel_speed", "rate"], start=0.02)
+    table = log.frame("truth", ["wheel_speed", "rate"], start=0.02)
+    assert list(table) == [f"{name}[{i}]" for name in ("wheel_speed", "rate") for i in range(3)]
+    np.testing.assert_array_equal(table.index, rows["time"])
+    np.testing.assert_array_equal(table["rate[2]"], rows["rate"][:, 2])
+    assert table.attrs["units"]["wheel_speed[0]"] == "rad/s"
+    assert list(log.frame("/truth", ["attitude_error"])) == ["attitude_error"]
+    with pytest.raises(InputError, match="no field 'rat' on /truth"):
+        log.frame("/truth", ["rat"])
+
+
+def test_a_log_and_a_result_show_themselves_in_a_notebook(tmp_path: Path) -> None:
+    check = "{name='<b>rate</b>', signal='truth.rate', below='1 deg/s'}"
+    result = mjspace.run(
+        "detumble-wheels", overrides=("duration=0.05", f"checks=[{check}]"), out=tmp_path
+    )
+    html = result._repr_html_()
+    assert "&lt;b&gt;rate&lt;/b&gt;" in html
+    assert "FAIL, not as expected" in html
+    whole = result.log._repr_html_()
+    assert html in whole
+    assert "wheel_speed [3]" in whole
+    page = result.log.plot("truth.rate")
+    assert page.data.startswith(b"\x89PNG")
+    assert page._repr_html_().startswith('<img style="max-width: 100%" src="data:image/png;base64,')
 
 
 def test_scenarios_are_listed_with_their_descriptions() -> None:

@@ -50,7 +50,10 @@ ROOMS = {
         "actuators algebra attitude contract environment errors interrupts log ranges scenario "
         "sensors signals tracing units vehicle"
     ),
-    "runner": "contract errors interrupts log reporting scenario signals simulation units vehicle",
+    "runner": (
+        "contract errors interrupts log plotting rendering reporting scenario signals simulation "
+        "units vehicle"
+    ),
     "campaign": "contract errors interrupts log reporting runner scenario simulation units",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",

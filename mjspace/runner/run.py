@@ -8,11 +8,11 @@ from pathlib import Path
 
 from mjspace.errors import FlightError, InputError, is_file_name, shortened, users_place_of
 from mjspace.interrupts import Interrupted, on_signals
-from mjspace.log.reader import Log
 from mjspace.runner.checks import Verdict, refuse_other_dimensions, refuse_unknown
 from mjspace.runner.flight_log import units_of
 from mjspace.runner.output import LOG, make_folder, refuse_existing, remove
 from mjspace.runner.recorder import Recorder
+from mjspace.runner.shown_log import Log, verdicts_table
 from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import Start, first_start
@@ -46,6 +46,9 @@ class Result:
     def log(self) -> Log:
         """The log, to read."""
         return Log(self.path)
+
+    def _repr_html_(self) -> str:
+        return str(verdicts_table(self.verdicts, self.trouble))
 
 
 def run(

@@ -34,7 +34,11 @@ def refusing_hidden_memory(law: Any) -> Iterator[Any]:
     try:
         called = copy.deepcopy(law)
         before = [
-            {n: copy.deepcopy(v) for n, v in variables.items() if isinstance(v, kept)}
+            {
+                name: copy.deepcopy(value)
+                for name, value in variables.items()
+                if isinstance(value, kept) and name != "__builtins__"  # Python's, not the law's
+            }
             for variables in modules
         ]
     except Exception as error:

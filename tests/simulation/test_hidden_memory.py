@@ -113,3 +113,10 @@ def test_a_law_that_cannot_be_copied_is_refused() -> None:
         refusing_hidden_memory(law),
     ):
         pass
+
+
+def test_what_python_s_builtins_hold_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A notebook puts its shell there, which cannot be copied."""
+    monkeypatch.setattr("builtins.shell", threading.Lock(), raising=False)
+    with refusing_hidden_memory(Law(lambda law: None)):
+        pass

@@ -25,7 +25,7 @@ def land(seed: int, shape: tuple[int, int] = (31, 37)) -> Array:
 
 def fitted(heights: Array, i: int, j: int) -> tuple[float, float]:
     """Return slope and roughness at a point, by least squares over its disc."""
-    r, c = np.indices(heights.shape)
+    r, c = np.mgrid[: heights.shape[0], : heights.shape[1]]
     near = SPACING * np.hypot(r - i, c - j) <= FOOTPRINT
     x, y, z = SPACING * (c - j)[near], SPACING * (r - i)[near], heights[near]
     matrix = np.column_stack([x, y, np.ones_like(x)])
