@@ -1,4 +1,4 @@
-"""Capture by the gravity gradient: the flight of gravity-gradient-capture is judged by these numbers.
+"""Capture by the gravity gradient: what gravity-gradient-capture is judged by.
 
 Pitch alone, I a'' + I' (a' + n) + c a' + 3/2 n^2 (Ir - Iy) sin 2a = 0, with the inertia of the boom
 as it comes out, integrated apart from the simulator.
@@ -35,7 +35,7 @@ def length(time: float) -> float:
 
 
 def tumble(rate: float, damping: float = DAMPING) -> Any:
-    """Return the solution, of pitch [rad] and momentum [N m s], from an absolute ``rate`` [rad/s]."""
+    """Return the solution, pitch [rad] and momentum [N m s], from an inertial ``rate`` [rad/s]."""
 
     def slope(time: float, state: Array) -> list[float]:
         pitch, momentum = state
