@@ -70,6 +70,8 @@ class BDot(Gains):
 class MagneticUnloading(Regulator):
     """m = k (h x B)/B^2: its torque -k h_perp unloads the momentum perpendicular to the field.
 
+    h is what the wheels have above the desired momentum, zero by default.
+
     R. Vazquez, Control activo de la actitud, Univ. Sevilla 2016, erratum 27: a moment gives the
     torque m x B, which has no component along B. The torque is fed forward to the wheels, so that
     it does not disturb the attitude.
@@ -77,13 +79,16 @@ class MagneticUnloading(Regulator):
 
     unloading_gain: float = gain("1/s", default=1e-3, at_least=0.0)
     """k."""
+    desired_momentum: Array = gain("N m s", (3,), default=(0.0, 0.0, 0.0))
+    """To which the wheels are unloaded, body axes: a bias that keeps them away from zero speed."""
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Reference
     ) -> tuple[Any, Any, Signals]:
         """Return the regulator's state and signals, and the wheels' torque and coils' moment."""
         state, wheels, signals = super().step(state, time, measurement, reference)
-        dipole, torque = unload.ufunc(signals.h, measurement.magnetic_field, self.unloading_gain)
+        excess = signals.h - self.desired_momentum
+        dipole, torque = unload.ufunc(excess, measurement.magnetic_field, self.unloading_gain)
         return state, Command(wheels.torque - torque, dipole), signals
 
 

@@ -23,6 +23,7 @@ class Command(NamedTuple):
 class ThrusterUnloading(Regulator):
     """Thrusters give M = -kd h, which is fed forward to the wheels: h = h0 exp(-kd t).
 
+    h is what the wheels have above the desired momentum, zero by default.
     R. Vazquez, Control activo de la actitud, Univ. Sevilla 2016. The feedforward keeps the attitude
     undisturbed; without it the attitude error is M/ka. M is held for a period T, so that kd is
     replaced by (1 - exp(-kd T))/T: then h equals the closed form at the end of every period.
@@ -34,6 +35,8 @@ class ThrusterUnloading(Regulator):
     """T; default: the scenario's."""
     feed_forward: float = gain(default=1.0, at_least=0.0, at_most=1.0)
     """Share of the thrusters' torque that is fed forward to the wheels; 0 shows the error M/ka."""
+    desired_momentum: Array = gain("N m s", (3,), default=(0.0, 0.0, 0.0))
+    """To which the wheels are unloaded, body axes: a bias that keeps them away from zero speed."""
 
     def step(
         self, state: Any, time: float, measurement: Measurement, reference: Reference
@@ -41,5 +44,5 @@ class ThrusterUnloading(Regulator):
         """Return the regulator's state and signals, and the torques of wheels and thrusters."""
         state, wheels, signals = super().step(state, time, measurement, reference)
         decay = -np.expm1(-self.unloading_gain * self.control_period) / self.control_period
-        thrusters = -decay * signals.h
+        thrusters = -decay * (signals.h - self.desired_momentum)
         return state, Command(wheels.torque - self.feed_forward * thrusters, thrusters), signals

@@ -46,15 +46,21 @@ def test_b_dot_brakes_what_turns_across_the_field() -> None:
     assert torque @ w < 0.0
 
 
-def test_magnetic_unloading_takes_what_is_across_the_field() -> None:
-    law, seen = MagneticUnloading(INERTIA, AXES, JW, unloading_gain=1e-3), readings()
+BIAS = np.array([2.0, -1.0, 3.0])
+
+
+@pytest.mark.parametrize("desired", [np.zeros(3), BIAS])
+def test_magnetic_unloading_takes_what_is_across_the_field(desired: Array) -> None:
+    gains = {"unloading_gain": 1e-3, "desired_momentum": desired}
+    law, seen = MagneticUnloading(INERTIA, AXES, JW, **gains), readings()
     _, command, shown = law.step(law.reset(seen, REST), 0.0, seen, REST)
     h, B = shown.h, seen.magnetic_field
     # absolute, about the wheels' axes
     np.testing.assert_allclose(h, 0.05 * (seen.wheel_speed + seen.rate), rtol=1e-14)
     given = np.cross(command.dipole, B)
     unit = attitude.normalize(B)
-    across = h - unit * np.sum(unit * h, axis=1, keepdims=True)
+    excess = h - desired
+    across = excess - unit * np.sum(unit * excess, axis=1, keepdims=True)
     np.testing.assert_allclose(given, -1e-3 * across, rtol=1e-11)
     np.testing.assert_allclose(np.sum(command.dipole * B, axis=1), 0.0, atol=1e-18)
     # what acts on the bus in the end is what points it
@@ -63,15 +69,15 @@ def test_magnetic_unloading_takes_what_is_across_the_field() -> None:
     np.testing.assert_allclose(command.torque + given, pointing.torque, rtol=1e-13)
 
 
+@pytest.mark.parametrize("desired", [np.zeros(3), BIAS])
 @pytest.mark.parametrize("told", [1.0, 0.0])
-def test_thrusters_bring_an_exponential_decay(told: float) -> None:
-    law = ThrusterUnloading(
-        INERTIA, AXES, JW, unloading_gain=0.005, control_period=2.0, feed_forward=told
-    )
+def test_thrusters_bring_an_exponential_decay(told: float, desired: Array) -> None:
+    gains = {"unloading_gain": 0.005, "control_period": 2.0, "desired_momentum": desired}
+    law = ThrusterUnloading(INERTIA, AXES, JW, **gains, feed_forward=told)
     seen = readings()
     _, command, shown = law.step(law.reset(seen, REST), 0.0, seen, REST)
     left = shown.h + 2.0 * command.thruster_torque
-    np.testing.assert_allclose(left, np.exp(-0.01) * shown.h, rtol=1e-14)
+    np.testing.assert_allclose(left - desired, np.exp(-0.01) * (shown.h - desired), rtol=1e-13)
     plain = Regulator(INERTIA, AXES, JW)
     _, pointing, _ = plain.step(plain.reset(seen, REST), 0.0, seen, REST)
     wheels = command.torque + told * command.thruster_torque
