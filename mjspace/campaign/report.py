@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from mjspace.campaign.flights import log_of
-from mjspace.campaign.results import WALL_TIME, JudgedResults
+from mjspace.campaign.results import WALL_TIME, JudgedResults, missing_column, value_column
 from mjspace.campaign.robustness import relative
 from mjspace.campaign.statistics import CONFIDENCE, Gate, Rate, Spread, rank_correlation, spread
 from mjspace.errors import printable
@@ -21,6 +22,7 @@ from mjspace.scenario.scenario import Check
 REQUIRED = (0.9, 0.99, 0.999)
 """Rates for which is said how many members are missing, where no gate names one."""
 WORST = 5
+QUANTILES = (">min", ">5 %", ">median", ">95 %", ">max")
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,20 @@ class CheckFigures:
     measured: Spread | None
     correlations: dict[str, float | None]
     """Spearman's, of each number drawn with the margin."""
+
+
+@dataclass(frozen=True)
+class MetricFigures:
+    """What a metric came to over all members."""
+
+    name: str
+    missing: int
+    """Members without a value."""
+    why: str
+    """Why the first of them has none."""
+    values: Spread | None
+    correlations: dict[str, float | None]
+    """Spearman's, of each number drawn with the value."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +76,7 @@ class Answer:
     troubled: int
     """Members that ended early."""
     checks: list[CheckFigures]
+    metrics: list[MetricFigures]
     worst: list[Worst]
     seconds: float
     """Of wall time, of all flights together."""
@@ -101,11 +118,20 @@ def answer(store: JudgedResults, gate: Gate | None) -> Answer:
         confidence,
         int(trouble.sum()),
         checks,
+        [_metric(store, metric.name) for metric in store.scenario.metrics],
         [_worst(store, int(members[i]), int(names[i])) for i in order],
         float(store.column(WALL_TIME).sum()),
         gate,
         store.folder,
     )
+
+
+def _metric(store: JudgedResults, name: str) -> MetricFigures:
+    values, column = store.column(value_column(name)), missing_column(name)
+    correlations = {draw: rank_correlation(store.column(draw), values) for draw in store.draws}
+    reasons = store.read([column])[column].to_pylist()
+    why = next((reason for reason in reasons if reason), "")
+    return MetricFigures(name, int(np.isnan(values).sum()), why, spread(values), correlations)
 
 
 def _worst(store: JudgedResults, member: int, check: int) -> Worst:
@@ -139,6 +165,7 @@ def data(found: Answer) -> dict[str, Any]:
         "needed": [{"rate": rate, "members": more} for rate, more in found.needed.items()],
         "ended_early": found.troubled,
         "checks": [dataclasses.asdict(check) for check in found.checks],
+        "metrics": [dataclasses.asdict(metric) for metric in found.metrics],
         "worst": [dataclasses.asdict(worst) for worst in found.worst],
         "out": str(found.folder),
     }
@@ -163,7 +190,7 @@ def show(found: Answer) -> None:
         else:
             console.print(f"  {shown}: {more} more members at this rate")
     _show_checks(console, found)
-    _show_correlations(console, found)
+    _show_metrics(console, found)
     table = _table("worst", ">member", "verdict", "why", "log")
     for each in found.worst:
         verdict = "[green]PASS[/]" if each.passed else "[bold red]FAIL[/]"
@@ -177,25 +204,43 @@ def show(found: Answer) -> None:
 
 
 def _show_checks(console: Console, found: Answer) -> None:
-    titles = (">failed", ">min", ">5 %", ">median", ">95 %", ">max")
-    table = _table(">", "check", *titles)
+    table = _table(">", "check", ">failed", *QUANTILES)
     for number, check in enumerate(found.checks, 1):
-        spread = check.measured
-        values = dataclasses.astuple(spread) if spread else ()
-        cells = [f"{value:.3g}" for value in values] or ["-"] * 5
         name = _plain(f"{check.name} {check.bound}")
-        table.add_row(str(number), name, str(check.failed), *cells)
+        table.add_row(str(number), name, str(check.failed), *_cells(check.measured))
     console.print(table)
+    _show_correlations(console, "the margin of check", found.checks)
 
 
-def _show_correlations(console: Console, found: Answer) -> None:
-    draws = list(found.checks[0].correlations) if found.checks else []
+def _show_metrics(console: Console, found: Answer) -> None:
+    if not found.metrics:
+        return
+    table = _table(">", "metric", ">missing", *QUANTILES)
+    for number, metric in enumerate(found.metrics, 1):
+        row = (_plain(metric.name), str(metric.missing), *_cells(metric.values))
+        table.add_row(str(number), *row)
+    console.print(table)
+    for metric in found.metrics:
+        if metric.missing:
+            why = f"{metric.name}: {metric.missing} members without: {metric.why}"
+            console.print(printable(why), markup=False)
+    _show_correlations(console, "metric", found.metrics)
+
+
+def _cells(values: Spread | None) -> list[str]:
+    return [f"{v:.3g}" for v in dataclasses.astuple(values)] if values else ["-"] * 5
+
+
+def _show_correlations(
+    console: Console, what: str, figures: Sequence[CheckFigures | MetricFigures]
+) -> None:
+    draws = list(figures[0].correlations) if figures else []
     if not draws:
         return
-    numbers = [f">{number}" for number in range(1, len(found.checks) + 1)]
-    table = _table("rank correlation with the margin of check", *numbers)
+    numbers = [f">{number}" for number in range(1, len(figures) + 1)]
+    table = _table(f"rank correlation with {what}", *numbers)
     for draw in draws:
-        cells = [check.correlations[draw] for check in found.checks]
+        cells = [each.correlations[draw] for each in figures]
         table.add_row(_plain(draw), *("-" if c is None else f"{c:+.2f}" for c in cells))
     console.print(table)
 

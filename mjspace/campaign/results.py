@@ -30,6 +30,16 @@ def draw_columns(scenario: Scenario) -> list[str]:
     return found
 
 
+def value_column(metric: str) -> str:
+    """Return the name of the column of the metric's values."""
+    return f"{metric}: value"
+
+
+def missing_column(metric: str) -> str:
+    """Return the name of the column that says why a member has no value of the metric."""
+    return f"{metric}: missing"
+
+
 def checks_of(scenario: Scenario) -> dict[str, Check]:
     """Return the checks of each flight, by names that are made unique."""
     checks = list(scenario.checks)
@@ -147,7 +157,12 @@ def results_in(folder: Path) -> JudgedResults:
     of_checks = [
         f"{n}: {what}" for n in results.checks for what in ("measured", "margin", "verdict")
     ]
-    for name in ("passed", "trouble", WALL_TIME, *results.draws, *of_checks):
+    of_metrics = [
+        column(metric.name)
+        for metric in scenario.metrics
+        for column in (value_column, missing_column)
+    ]
+    for name in ("passed", "trouble", WALL_TIME, *results.draws, *of_checks, *of_metrics):
         if name not in columns:
             raise InputError(f"{folder}: its members lack {name!r}")
     return results

@@ -122,7 +122,10 @@ def tune(
     ],
     minimized: Annotated[
         str,
-        typer.Option("--minimize", help="'rms(truth.attitude_error)', its mean over draws."),
+        typer.Option(
+            "--minimize",
+            help="'rms(truth.attitude_error)', or a metric's name: its mean over draws.",
+        ),
     ],
     require: Annotated[
         list[str],
@@ -156,9 +159,10 @@ def tune(
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
     chosen, goal = [varied(text) for text in vary], Goal(minimized, tuple(require))
-    goal.checks()  # refuses what is none, before anything flies
     what = Campaign(scenario, tuple(overrides), count, seed, trust)
-    folder = output_folder(out, population(what, alike=True).scenario.name, "tuned")
+    tuned = population(what, alike=True).scenario
+    goal.checks(tuned.metrics)  # refuses what is none, before anything flies
+    folder = output_folder(out, tuned.name, "tuned")
     if (folder / SCENARIO).exists():
         raise InputError(f"{folder / SCENARIO}: is there already: give another folder by --out")
     with cause_shown(traceback), count_bar(count * draws, "flying") as told:

@@ -3,18 +3,20 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
-from mjspace.contract import TICK, Array
+from mjspace.contract import Array
 from mjspace.errors import InputError, input_error_at
+from mjspace.runner.metrics import Functions, Measured, Meter
 from mjspace.runner.statistic import Statistic
-from mjspace.scenario.scenario import Check, EventTable, SignalRegion
-from mjspace.signals import Topics, find_signal, magnitude
+from mjspace.runner.windows import Rows, Windows, numbers_of
+from mjspace.scenario.metrics import Metric
+from mjspace.scenario.scenario import Check, EventTable
+from mjspace.signals import Topics, find_signal
 from mjspace.units import Quantity, Unit
-
-Rows = Mapping[str, Mapping[str, Array]]
 
 Outcome = Literal["PASS", "FAIL", "not measured"]
 
@@ -93,6 +95,7 @@ def refuse_other_dimensions(
     events: Sequence[EventTable],
     topics: Topics,
     units: Mapping[str, Mapping[str, Unit]],
+    metrics: Sequence[Metric] = (),
 ) -> None:
     """Refuse bounds and targets that measure something else than their signal.
 
@@ -102,9 +105,14 @@ def refuse_other_dimensions(
     Raises:
         InputError: the first of them, with both units.
     """
-    regions: dict[str, SignalRegion] = {f"checks.{n}": check for n, check in enumerate(checks)}
-    regions |= {f"events.{n}": event for n, event in enumerate(events)}
+    regions: dict[str, Check | EventTable | Metric] = {
+        **{f"checks.{n}": check for n, check in enumerate(checks)},
+        **{f"events.{n}": event for n, event in enumerate(events)},
+        **{f"metrics.{n}": metric for n, metric in enumerate(metrics)},
+    }
     for place, region in regions.items():
+        if region.signal is None:
+            continue
         topic, field, _ = find_signal(topics, region.signal)
         unit = units.get(topic, {}).get(field)
         if unit is None:
@@ -120,78 +128,59 @@ def refuse_other_dimensions(
 
 
 class Judge:
-    """The checks of one vehicle's flight, judged as it flies: on every control period.
+    """The checks and metrics of one vehicle's flight, followed on every control period.
 
     A vehicle over a ground is checked for ``NO_CRASH`` as well.
     """
 
     def __init__(
-        self, checks: Sequence[Check], events: Sequence[EventTable], topics: Topics
+        self,
+        checks: Sequence[Check],
+        events: Sequence[EventTable],
+        topics: Topics,
+        metrics: Sequence[Metric] = (),
+        functions: Functions = MappingProxyType({}),
     ) -> None:
         """Begin a flight with these ``topics``.
 
-        ``events`` are the scenario's, which checks may count from; one that never happens leaves
-        nothing to measure.
+        ``events`` are the scenario's, which checks and metrics may count from; one that never
+        happens leaves nothing to measure. ``functions`` are those of the metrics.
 
         Raises:
-            ValueError: a check or an event that it counts from names a signal that is not there.
+            ValueError: a check, a metric, or an event that one counts from names a signal that is
+                not there.
         """
         if "crash" in topics.get("/truth", {}):
             own = any(check.signal == NO_CRASH.signal for check in checks)
             checks = checks if own else [*checks, NO_CRASH]
-        named = [name for check in checks for name in (check.since, check.until) if name]
-        self._events = {
-            e.name: (e, find_signal(topics, e.signal)) for e in events if e.name in named
-        }
-        self._happened = dict.fromkeys(self._events, math.nan)
+        self._windows = Windows([*checks, *metrics], events, topics)
         self._measured = [
             (check, find_signal(topics, check.signal), Statistic(check)) for check in checks
         ]
+        self._meter = Meter(metrics, functions, topics)
 
     def add(self, time: Array, rows: Rows) -> None:
         """Go on with n > 0 control periods at ``time`` [s]; ``rows[topic][field]`` is (n, ...)."""
-        stamps = np.rint(time * 1e9)  # as they stand in the log
-        for name, (event, signal) in self._events.items():
-            if math.isnan(self._happened[name]):
-                inside = event.admits(magnitude(_numbers(rows, signal)))
-                if inside.any():
-                    self._happened[name] = float(stamps[np.argmax(inside)] / 1e9)
+        self._windows.add(time, rows)
         for check, signal, statistic in self._measured:
-            start, end = _window(check, self._happened)
-            low = np.searchsorted(stamps, np.rint(start * 1e9), "left")
-            high = np.searchsorted(stamps, np.rint(end * 1e9), "right")
-            if low < high:
-                statistic.add(_numbers(rows, signal)[low:high])
+            part = self._windows.part(check)
+            if part.start < part.stop:
+                statistic.add(numbers_of(rows, signal)[part])
+        self._meter.add(self._windows, time, rows)
 
     def verdicts(self) -> list[Verdict]:
         """Return the verdict of each check on what has been flown so far."""
         return [self._verdict(check, statistic) for check, _, statistic in self._measured]
 
+    def metrics(self) -> list[Measured]:
+        """Return what each metric came to in what has been flown so far."""
+        return self._meter.measured(self._windows)
+
     def _verdict(self, check: Check, statistic: Statistic) -> Verdict:
-        for name in (check.since, check.until):
-            if name and math.isnan(self._happened[name]):
-                return Verdict(check, math.nan, f"event {name!r} never happened")
+        if never := self._windows.never(check):
+            return Verdict(check, math.nan, never)
         if not statistic.count:
-            start, end = _window(check, self._happened)
-            until = "the end" if end == math.inf else f"{end:.6g} s"
-            return Verdict(check, math.nan, f"no sample from {start:.6g} s to {until}")
+            return Verdict(check, math.nan, self._windows.without_sample(check))
         measured = statistic.value()
         missing = f"{check.signal} is not a number" if math.isnan(measured) else ""
         return Verdict(check, measured, missing)
-
-
-def _numbers(rows: Rows, signal: tuple[str, str, slice]) -> Array:
-    """Return the signal's numbers (n, k)."""
-    topic, field, part = signal
-    values = rows[topic][field]
-    return values.reshape(len(values), -1)[:, part]
-
-
-def _window(check: Check, happened: Mapping[str, float]) -> tuple[float, float]:
-    """Return the check's first and last instant [s], as far as what ``happened`` tells them."""
-    zero = happened[check.since] if check.since else 0.0
-    before = happened[check.until] - TICK if check.until else math.inf
-    if math.isnan(zero):
-        return math.inf, -math.inf
-    end = math.inf if check.end is None else zero + check.end
-    return zero + check.start, end if math.isnan(before) else min(end, before)

@@ -11,6 +11,7 @@ from mjspace.reporting import flight
 from mjspace.reporting.flight import CheckRow, Flight
 from mjspace.runner.checks import Verdict, margin
 from mjspace.runner.logged_verdicts import judged
+from mjspace.runner.metrics import LINE
 from mjspace.scenario.scenario import Check
 from mjspace.signals import find_signal
 from mjspace.units import Unit
@@ -42,7 +43,8 @@ def _flight(log: Log) -> Flight:
     scenario = scenario_of(log)
     found = judged(log, scenario)
     rows = [_row(log, verdict) for verdict in found.verdicts]
-    return Flight(log, scenario, rows, found.passed, found.trouble, found.events)
+    lines = [line.removeprefix(LINE) for line in found.metrics]
+    return Flight(log, scenario, rows, lines, found.passed, found.trouble, found.events)
 
 
 def _row(log: Log, verdict: Verdict) -> CheckRow:

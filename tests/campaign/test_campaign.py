@@ -245,7 +245,7 @@ def test_bad_input_is_one_line(
     out = tmp_path / "out"
     store = Store(out, population(what))
     with store.opened():
-        store.write([Flown(0, [0.3], [], "it was stopped", 1.0)])
+        store.write([Flown(0, [0.3], [], [], "it was stopped", 1.0)])
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     usual = ["campaign", what.scenario, "--out", str(out)]
     for option, value in (("--n", "3"), ("--seed", "1")):
