@@ -9,6 +9,7 @@ import numpy as np
 from scipy import special, stats
 from scipy.stats import qmc
 
+from mjspace.campaign.sensitivity import SAMPLING, group_size
 from mjspace.contract import Array
 from mjspace.scenario.dispersions import Dispersion
 
@@ -22,8 +23,8 @@ def uniforms(
 ) -> Array:
     """Return the uniform numbers of these of the ``count`` members, (len(members), width).
 
-    A member's are the same in whatever company it is drawn. Those of ``random`` and ``sobol`` do
-    not depend on ``count`` either.
+    A member's are the same in whatever company it is drawn. Those of a Latin
+    hypercube alone depend on ``count`` as well.
     """
     width = width_of(dispersions)
     if not width or not len(members):
@@ -31,6 +32,8 @@ def uniforms(
     if sampling == "random":
         streams = [np.random.SeedSequence(seed, spawn_key=(member,)) for member in members]
         points = np.array([np.random.default_rng(stream).random(width) for stream in streams])
+    elif sampling == SAMPLING:
+        points = _exchanged(seed, members, dispersions)
     else:
         rng = np.random.default_rng(seed)
         kind = {"latin_hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol}[sampling]
@@ -39,6 +42,30 @@ def uniforms(
             points = kind(width, rng=rng).random(count)[list(members)]
     inside: Array = np.clip(points, _LEAST, 1.0 - _LEAST)
     return inside
+
+
+def _exchanged(seed: int, members: Sequence[int], dispersions: Sequence[Dispersion]) -> Array:
+    """Return the points of groups in which one dispersion at a time is exchanged.
+
+    The members of a group are A, B, and A with the numbers of the first dispersion as in B, of the
+    second, and so on. A and B are halves of a point of one Sobol sequence.
+    """
+    widths = [WIDTH.get(each.distribution, 1) for each in dispersions]
+    ends = np.cumsum(widths)
+    width, size = int(ends[-1]), group_size(len(dispersions))
+    groups = max(members) // size + 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a member alone needs those up to its own
+        pairs = qmc.Sobol(2 * width, rng=np.random.default_rng(seed)).random(groups)
+    points = np.empty((len(members), width))
+    for row, member in zip(points, members, strict=True):
+        group, place = divmod(member, size)
+        one, other = pairs[group, :width], pairs[group, width:]
+        row[:] = other if place == 1 else one
+        if place > 1:
+            part = slice(ends[place - 2] - widths[place - 2], ends[place - 2])
+            row[part] = other[part]
+    return points
 
 
 def width_of(dispersions: Sequence[Dispersion]) -> int:

@@ -15,7 +15,9 @@ from rich.table import Table
 from mjspace.campaign.flights import log_of
 from mjspace.campaign.results import WALL_TIME, JudgedResults, missing_column, value_column
 from mjspace.campaign.robustness import relative
+from mjspace.campaign.sensitivity import SAMPLING, Sensitivity, independent, indices
 from mjspace.campaign.statistics import CONFIDENCE, Gate, Rate, Spread, rank_correlation, spread
+from mjspace.contract import Array
 from mjspace.errors import printable
 from mjspace.scenario.scenario import Check
 
@@ -77,6 +79,8 @@ class Answer:
     """Members that ended early."""
     checks: list[CheckFigures]
     metrics: list[MetricFigures]
+    sensitivities: list[Sensitivity]
+    """Of each margin and each metric, where the sampling allows."""
     worst: list[Worst]
     seconds: float
     """Of wall time, of all flights together."""
@@ -94,7 +98,11 @@ class Answer:
 def answer(store: JudgedResults, gate: Gate | None) -> Answer:
     """Return what the members flown so far show; a column at a time is in memory."""
     passed = store.column("passed")
-    rate = Rate(int(passed.sum()), len(passed))
+    keys = [each.key for each in store.scenario.dispersions]
+    exchanged = store.scenario.sampling == SAMPLING
+    members = store.column("member")
+    own = passed[independent(members, len(keys))] if exchanged else passed
+    rate = Rate(int(own.sum()), len(own))
     confidence = CONFIDENCE if gate is None else gate.confidence
     required = REQUIRED if gate is None else (gate.required,)
     trouble = np.array([bool(t) for t in store.read(["trouble"])["trouble"].to_pylist()], bool)
@@ -110,7 +118,7 @@ def answer(store: JudgedResults, gate: Gate | None) -> Answer:
         correlations = {d: rank_correlation(store.column(d), margins) for d in store.draws}
         measured = spread(store.column(f"{name}: measured"))
         checks.append(CheckFigures(name, _bound(check), int(wrong.sum()), measured, correlations))
-    order, members = np.lexsort((least, passed))[:WORST], store.column("member")
+    order = np.lexsort((least, passed))[:WORST]
     return Answer(
         rate,
         rate.interval(confidence),
@@ -119,6 +127,7 @@ def answer(store: JudgedResults, gate: Gate | None) -> Answer:
         int(trouble.sum()),
         checks,
         [_metric(store, metric.name) for metric in store.scenario.metrics],
+        _sensitivities(store, keys, members, confidence) if exchanged else [],
         [_worst(store, int(members[i]), int(names[i])) for i in order],
         float(store.column(WALL_TIME).sum()),
         gate,
@@ -132,6 +141,19 @@ def _metric(store: JudgedResults, name: str) -> MetricFigures:
     reasons = store.read([column])[column].to_pylist()
     why = next((reason for reason in reasons if reason), "")
     return MetricFigures(name, int(np.isnan(values).sum()), why, spread(values), correlations)
+
+
+def _sensitivities(
+    store: JudgedResults, keys: Sequence[str], members: Array, confidence: float
+) -> list[Sensitivity]:
+    """Return the indices of what the members up to the first that is missing show."""
+    columns = {f"margin of {name}": f"{name}: margin" for name in store.checks}
+    columns |= {metric.name: value_column(metric.name) for metric in store.scenario.metrics}
+    first = int(np.argmin(np.append(members, np.inf) == np.arange(len(members) + 1)))
+    return [
+        indices(name, keys, store.column(column)[:first], confidence)
+        for name, column in columns.items()
+    ]
 
 
 def _worst(store: JudgedResults, member: int, check: int) -> Worst:
@@ -166,6 +188,7 @@ def data(found: Answer) -> dict[str, Any]:
         "ended_early": found.troubled,
         "checks": [dataclasses.asdict(check) for check in found.checks],
         "metrics": [dataclasses.asdict(metric) for metric in found.metrics],
+        "sensitivities": [dataclasses.asdict(each) for each in found.sensitivities],
         "worst": [dataclasses.asdict(worst) for worst in found.worst],
         "out": str(found.folder),
     }
@@ -191,6 +214,8 @@ def show(found: Answer) -> None:
             console.print(f"  {shown}: {more} more members at this rate")
     _show_checks(console, found)
     _show_metrics(console, found)
+    for sensitivity in found.sensitivities:
+        _show_sensitivity(console, sensitivity, percent)
     table = _table("worst", ">member", "verdict", "why", "log")
     for each in found.worst:
         verdict = "[green]PASS[/]" if each.passed else "[bold red]FAIL[/]"
@@ -242,6 +267,20 @@ def _show_correlations(
     for draw in draws:
         cells = [each.correlations[draw] for each in figures]
         table.add_row(_plain(draw), *("-" if c is None else f"{c:+.2f}" for c in cells))
+    console.print(table)
+
+
+def _show_sensitivity(console: Console, found: Sensitivity, percent: str) -> None:
+    name = _plain(found.name)
+    if found.why:
+        console.print(f"Sobol indices of {name}: none, {found.why}")
+        return
+    titles = (">first order", f">{percent} interval", ">total", f">{percent} interval")
+    table = _table(f"Sobol indices of {name}", *titles)
+    for key, first in found.first.items():
+        orders = (first, found.total[key])
+        cells = [c for i in orders for c in (f"{i.value:.3f}", f"{i.low:.3f} to {i.high:.3f}")]
+        table.add_row(_plain(key), *cells)
     console.print(table)
 
 

@@ -134,9 +134,9 @@ class Scenario(Table):
     dispersions: list[Dispersion] = []
     """What differs from member to member of ``mjspace campaign``; every other command flies the
     scenario as it stands."""
-    sampling: Literal["random", "latin_hypercube", "sobol"] = "random"
+    sampling: Literal["random", "latin_hypercube", "sobol", "saltelli"] = "random"
     """How a campaign covers what its dispersions span. With ``latin_hypercube`` the draws depend on
-    the number of members too."""
+    the number of members too; ``saltelli`` is for Sobol indices."""
 
     @property
     def kinds(self) -> dict[str, str]:
