@@ -67,7 +67,7 @@ def fly(
     """
     members = population(campaign)
     if members.scenario.sampling == SAMPLING:
-        refuse_unfit([each.key for each in members.dispersions], campaign.count)
+        refuse_unfit([each.name for each in members.dispersions], campaign.count)
     store = Store(out, members)
     with store.opened():
         done = store.finished()

@@ -50,7 +50,7 @@ def _exchanged(seed: int, members: Sequence[int], dispersions: Sequence[Dispersi
     The members of a group are A, B, and A with the numbers of the first dispersion as in B, of the
     second, and so on. A and B are halves of a point of one Sobol sequence.
     """
-    widths = [WIDTH.get(each.distribution, 1) for each in dispersions]
+    widths = [width_of([each]) for each in dispersions]
     ends = np.cumsum(widths)
     width, size = int(ends[-1]), group_size(len(dispersions))
     groups = max(members) // size + 1
@@ -70,7 +70,7 @@ def _exchanged(seed: int, members: Sequence[int], dispersions: Sequence[Dispersi
 
 def width_of(dispersions: Sequence[Dispersion]) -> int:
     """Return how many uniform numbers a member draws."""
-    return sum(WIDTH.get(each.distribution, 1) for each in dispersions)
+    return sum(len(each.keys or ()) or WIDTH.get(each.distribution, 1) for each in dispersions)
 
 
 def values(dispersions: Sequence[Dispersion], nominal: Sequence[Any], row: Array) -> list[Any]:
@@ -80,7 +80,7 @@ def values(dispersions: Sequence[Dispersion], nominal: Sequence[Any], row: Array
     """
     found, place = [], 0
     for dispersion, own in zip(dispersions, nominal, strict=True):
-        width = WIDTH.get(dispersion.distribution, 1)
+        width = width_of([dispersion])
         found.append(value(dispersion, own, row[place : place + width]))
         place += width
     return found
@@ -90,6 +90,8 @@ def value(dispersion: Dispersion, nominal: Any, u: Array) -> Any:
     """Return the number, or the vector as a list, that the uniform numbers ``u`` make."""
     d: Any = dispersion
     match d.distribution:
+        case "normal" if d.covariance is not None:
+            return correlated(np.array(d.covariance), nominal, u)
         case "normal":
             mean = nominal if d.mean is None else d.mean
             return float(mean + d.std * special.ndtri(u[0]))
@@ -109,6 +111,17 @@ def value(dispersion: Dispersion, nominal: Any, u: Array) -> Any:
             return random_attitude(u)
         case _:
             return [float(d.radius * x) for x in direction(u)]
+
+
+def correlated(covariance: Array, mean: Sequence[float], u: Array) -> list[float]:
+    """Return normal numbers about ``mean`` (n,), of uniform numbers ``u`` (n,).
+
+    The covariance may be singular: its square root is by eigenvectors.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    found: list[float] = (np.array(mean) + root @ special.ndtri(u)).tolist()
+    return found
 
 
 def random_attitude(u: Array) -> list[float]:

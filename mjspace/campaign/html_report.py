@@ -3,6 +3,7 @@
 import json
 import os
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -141,9 +142,14 @@ def _link(log: Path, output: Path) -> str:
 
 def _parameters(dispersion: Dispersion) -> tuple[str, str, str]:
     """Return the key, the distribution and its parameters."""
-    table = dispersion.model_dump(exclude_none=True, exclude={"key", "distribution"})
-    words = (
-        f"{key} {', '.join(f'{x:.6g}' for x in (value if isinstance(value, list) else [value]))}"
-        for key, value in table.items()
-    )
-    return dispersion.key, dispersion.distribution, "; ".join(words)
+    table = dispersion.model_dump(exclude_none=True, exclude={"key", "keys", "distribution"})
+    words = (f"{key} {_numbers(value)}" for key, value in table.items())
+    return dispersion.name, dispersion.distribution, "; ".join(words)
+
+
+def _numbers(value: Any) -> str:
+    """Return a number, a list or a matrix of them, by rows."""
+    if not isinstance(value, list):
+        return f"{value:.6g}"
+    rows = any(isinstance(each, list) for each in value)
+    return (" / " if rows else ", ").join(map(_numbers, value))

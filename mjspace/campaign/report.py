@@ -98,7 +98,7 @@ class Answer:
 def answer(store: JudgedResults, gate: Gate | None) -> Answer:
     """Return what the members flown so far show; a column at a time is in memory."""
     passed = store.column("passed")
-    keys = [each.key for each in store.scenario.dispersions]
+    keys = [each.name for each in store.scenario.dispersions]
     exchanged = store.scenario.sampling == SAMPLING
     members = store.column("member")
     own = passed[independent(members, len(keys))] if exchanged else passed

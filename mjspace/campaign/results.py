@@ -25,8 +25,8 @@ def draw_columns(scenario: Scenario) -> list[str]:
     found: list[str] = []
     for dispersion in scenario.dispersions:
         count = {"random_attitude": 4, "on_sphere": 3}.get(dispersion.distribution)
-        key = dispersion.key
-        found += [key] if count is None else [f"{key}[{i}]" for i in range(count)]
+        for key in dispersion.all_keys:
+            found += [key] if count is None else [f"{key}[{i}]" for i in range(count)]
     return found
 
 

@@ -163,7 +163,7 @@ def tune(
             if isinstance(found, bool) or not (found is None or isinstance(found, int | float)):
                 raise ValueError(f"{each.key} is {found!r}, should be a number")
             own[each.key] = found
-        if any(each.path == dispersion.path for dispersion in members.dispersions):
+        if any(each.path in dispersion.paths for dispersion in members.dispersions):
             raise InputError(f"--vary {each.key}: it is dispersed")
     members.with_values({each.path: each.written(each.low) for each in what}).member(0)
     trials: dict[tuple[float, ...], float] = {}

@@ -43,15 +43,14 @@ def falsify(
 
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
-    what = Campaign(scenario, tuple(overrides), count, seed, trust)
-    members = population(what)
+    members = population(Campaign(scenario, tuple(overrides), count, seed, trust))
     last = f"counterexample-seed-{members.scenario.seed}"
     folder = output_folder(out, members.scenario.name, last)
     refuse_existing(folder / LOG, force=False)
     with cause_shown(traceback), count_bar(count, "flying") as told:
-        found = search(what, go_on=go_on, processes=workers, told=told)
+        found = search(members, go_on=go_on, processes=workers, told=told)
     result = None if found.minimal is None else write(members, found.minimal, folder)
-    keys = [dispersion.key for dispersion in members.dispersions]
+    keys = [dispersion.name for dispersion in members.dispersions]
     minimal = [None] * len(keys) if found.minimal is None else found.minimal.draws
     rows = list(zip(keys, nominal_draws(members), found.worst.draws, minimal, strict=True))
     if as_json:
