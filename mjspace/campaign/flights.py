@@ -172,7 +172,8 @@ def judged(assembly: Assembly, start: Start, members: Sequence[int]) -> tuple[li
             if not judges:
                 refuse_unjudgeable(assembly, block)
                 topics = shapes(block)
-                what = scenario.checks, scenario.events, topics, scenario.metrics, assembly.metrics
+                metrics = scenario.metrics, assembly.metrics
+                what = scenario.checks, scenario.events, topics, *metrics, scenario.rates.control
                 judges = [Judge(*what) for _ in members]
             for vehicle, judge in enumerate(judges):
                 judge.add(block.time, one_vehicle(block, vehicle))

@@ -37,7 +37,7 @@ def write(results: JudgedResults, found: Answer, output: Path) -> None:
         _histogram(
             f"{figures.name} {figures.bound}",
             results.column(f"{name}: measured"),
-            f"measured: {check.statistic} of {check.signal}",
+            f"measured: {check.formula or f'{check.statistic} of {check.signal}'}",
             check.below,
             check.above,
         )

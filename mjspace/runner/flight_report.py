@@ -79,7 +79,7 @@ def _row(log: Log, verdict: Verdict) -> CheckRow:
 
 def _unit(log: Log, check: Check) -> tuple[str, float]:
     """Return the unit of the check's number as it is displayed, and the factor from SI to it."""
-    if check.relative:
+    if check.relative or check.formula:
         return "", 1.0
     try:
         topic, field, _ = find_signal(log.topics, check.signal)
@@ -92,7 +92,7 @@ def _unit(log: Log, check: Check) -> tuple[str, float]:
 
 def _claim(check: Check) -> str:
     """Return what is measured: the statistic, the signal and the window."""
-    claim = f"{check.statistic} of {check.signal}"
+    claim = check.formula or f"{check.statistic} of {check.signal}"
     if check.target is not None:
         claim += f" less {check.target}" + (", relative" if check.relative else "")
     begins = f"from {check.start:g} s" if check.statistic != "final" and check.start else ""

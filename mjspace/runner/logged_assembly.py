@@ -67,7 +67,11 @@ def _without_signals_of_the_law(scenario: Scenario) -> Scenario:
 
     events = [event for event in scenario.events if is_free(event.signal, *event.shows)]
     kept = {None, *(event.name for event in events)}
-    checks = [c for c in scenario.checks if is_free(c.signal) and {c.since, c.until} <= kept]
+    checks = [
+        c
+        for c in scenario.checks
+        if is_free(c.signal, *(c.signals or {}).values()) and {c.since, c.until} <= kept
+    ]
     metrics = [
         m
         for m in scenario.metrics

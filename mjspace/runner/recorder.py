@@ -42,7 +42,12 @@ class Recorder:
         """
         assembly, scenario = self._assembly, self._assembly.scenario
         self._judge = Judge(
-            scenario.checks, scenario.events, shapes(first), scenario.metrics, assembly.metrics
+            scenario.checks,
+            scenario.events,
+            shapes(first),
+            scenario.metrics,
+            assembly.metrics,
+            scenario.rates.control,
         )
         self._thread.call(self._create, path, member, first)
 

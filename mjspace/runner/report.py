@@ -80,6 +80,7 @@ def result_data(result: Result) -> dict[str, Any]:
                 "name": verdict.check.name,
                 "requirement": verdict.check.requirement,
                 "signal": verdict.check.signal,
+                "formula": verdict.check.formula,
                 "statistic": verdict.check.statistic,
                 "measured": None if verdict.missing else verdict.measured,
                 "below": verdict.check.below,

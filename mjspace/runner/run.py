@@ -9,7 +9,12 @@ from pathlib import Path
 from mjspace.errors import FlightError, InputError, is_file_name, shortened, users_place_of
 from mjspace.interrupts import Interrupted, on_signals
 from mjspace.log.reader import Log
-from mjspace.runner.checks import Verdict, refuse_other_dimensions, refuse_unknown
+from mjspace.runner.checks import (
+    Verdict,
+    refuse_other_dimensions,
+    refuse_unfit_formulas,
+    refuse_unknown,
+)
 from mjspace.runner.flight_log import units_of
 from mjspace.runner.metrics import Measured, refuse_unknown_signals
 from mjspace.runner.output import LOG, make_folder, refuse_existing, remove
@@ -152,4 +157,5 @@ def refuse_unjudgeable(assembly: Assembly, first: Block) -> None:
     refuse_unknown(scenario.checks, topics)
     refuse_unknown_signals(scenario.metrics, topics)
     units = units_of(assembly, first.kinds)
+    refuse_unfit_formulas(scenario.checks, topics, units, scenario.rates.control)
     refuse_other_dimensions(scenario.checks, scenario.events, topics, units, scenario.metrics)

@@ -65,6 +65,12 @@ class Check(Measurement, SignalRegion):
     statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
     """Over the window: of the value, or of the norm of a vector; ``peak`` is the largest magnitude,
     ``drift`` the largest change from the window's first value. It is what has to be in bounds."""
+    formula: str | None = None
+    """In place of a signal and its bounds, of temporal logic:
+    ``"always(dark -> eventually[0:60 s](error < 1 deg))"``. What is measured is its robustness,
+    over the sizes of the bounds in it, which has to be above 0."""
+    signals: dict[str, str] | None = None
+    """Of the formula: the signal of each name in it; one that is named alone is a flag, 0 or 1."""
     expected: Literal["PASS", "FAIL"] = "PASS"
     """How the check comes out when all is well: FAIL of what the flight shows not to hold. The
     scenario passes if it reaches its end and every check comes out as expected; a check without a
@@ -77,6 +83,21 @@ class Check(Measurement, SignalRegion):
     fails_with: list[str] = []
     """``"key=value"``, or a list of them that go together, as ``--set`` takes them: a change of the
     scenario with which the check comes out the other way, because what it claims is gone."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_a_formula(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or table.get("formula") is None:
+            if isinstance(table, dict) and table.get("signals") is not None:
+                raise ValueError("signals: go with a formula")
+            return table
+        if not table.get("signals"):
+            raise ValueError("signals: missing, what each name in the formula stands for")
+        fixed = {"signal": "", "above": 0.0, "statistic": "min", "relative": False}
+        for key in (*fixed, "below", "target"):
+            if table.get(key, fixed.get(key)) != fixed.get(key):
+                raise ValueError(f"{key}: goes with a signal, not with a formula")
+        return table | fixed
 
     @field_validator("fails_with", mode="before")
     @classmethod

@@ -70,6 +70,25 @@ def test_the_weakness_is_found_and_made_minimal(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("here")
+def test_a_formula_that_is_violated_in_a_corner_is_found(tmp_path: Path) -> None:
+    pytest.importorskip("rtamt")
+    # A second after 0.01 rad/s there is (1 - T gain / inertia)^2 of it: over 0.004 with gains
+    # below 0.37 inertia / T, and beyond 1.63 of it, which this range does not reach.
+    formula = """formula = "always(begins > 0.3 deg/s -> eventually[1:1 s](rate < 0.004 rad/s))"
+signals = { begins = "truth.rate", rate = "truth.rate" }
+"""
+    text = SCENARIO.replace('signal = "truth.rate"\nstart = "5 s"\nbelow = 0.01\n', formula)
+    text = text.replace("low = 2\nhigh = 30", "low = 5\nhigh = 25")
+    what = Campaign(written(tmp_path, text), ("law.rate_gain=15",), 100, 1)
+    found = searched(what)
+    assert found.worst.margin < 0.0
+    gain, inertia, _ = found.worst.draws
+    left = (1.0 - 0.5 * gain / inertia) ** 2
+    assert found.worst.margin == pytest.approx(1.0 - 0.01 * left / 0.004, abs=0.05)
+    assert found.worst.why.startswith("FAIL rate: -")
+
+
+@pytest.mark.usefixtures("here")
 def test_where_nothing_fails_the_least_margin_is_told(tmp_path: Path) -> None:
     safe = SCENARIO.replace("high = 30", "high = 20")
     found = searched(Campaign(written(tmp_path, safe), (), 30, 1))
