@@ -156,7 +156,7 @@ def _ahead(values: Array, low: int, high: int, largest: bool) -> Array:
 
 def _changed(values: Array, sign: float) -> Array:
     """Return whether it begins (1) or ends (-1) to hold; nothing does at the first sample."""
-    earlier = np.concatenate([[-np.inf if sign > 0.0 else np.inf], values[:-1]])
+    earlier = np.concatenate([values[:1], values[:-1]])
     return np.minimum(-sign * earlier, sign * values)
 
 
@@ -215,6 +215,8 @@ class Monitor:
         formula = self._formula
         rows = [atom.robustness(values[atom.name]) for atom in formula.atoms]
         self._atoms = np.hstack([self._atoms, np.array(rows)])
+        if np.isnan(rows).any():  # the filters pass over it, and it must fail
+            self._least = math.nan
         waiting = self._atoms.shape[1] - self._done - formula.after
         if waiting >= _LEAST_CHUNK:
             self._judge()
@@ -231,7 +233,7 @@ class Monitor:
             whole = self._atoms.shape[1] - formula.after
             found = robustness(formula.root, self._atoms)[self._done : whole]
             found = found if formula.always else found[:1]
-            self._least = float(np.min([self._least, found.min()]))  # passes NaN on
+            self._least = float(np.min([self._least, found.min()]))
             self.count += len(found)
             self._done = whole
         kept = max(self._done - formula.before, 0)

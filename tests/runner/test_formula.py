@@ -73,6 +73,8 @@ def test_a_window_and_a_flight_that_is_too_short() -> None:
     short = measured("always(eventually[0:12 s](error < 2))")
     assert short.outcome == "not measured"
     assert "ends before what the formula looks ahead" in short.missing
+    # It is dark from the first sample on, before which nothing is known: that is no entry.
+    assert measured("always(rise(dark) -> error > 3.5)", start=3.0, end=6.0).measured == 1.0
 
 
 @pytest.mark.parametrize(
@@ -195,8 +197,10 @@ def test_without_rtamt_one_line_says_what_to_install(
     assert "pip install 'mjspace[logic]'" in error
 
 
-def test_a_value_that_is_no_number_is_not_passed_over() -> None:
-    monitor = Monitor(parsed("always(a < 1)", {"a": "x"}, 1.0))
+@pytest.mark.parametrize("text", ["always(a < 1)", "always(eventually[0:1 s](a < 1))"])
+def test_a_value_that_is_no_number_is_not_passed_over(text: str) -> None:
+    monitor = Monitor(parsed(text, {"a": "x"}, 1.0))
     values: Array = np.array([0.0, np.nan, 0.5])
     monitor.add({"a": values})
+    monitor.add({"a": np.zeros(3)})
     assert math.isnan(monitor.value())
