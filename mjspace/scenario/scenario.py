@@ -1,14 +1,13 @@
 """A scenario, whole: what flies, where, under which law, how long, and what it must show."""
 
+import operator
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    SerializerFunctionWrapHandler,
     ValidationInfo,
-    field_serializer,
     field_validator,
     model_validator,
 )
@@ -149,7 +148,8 @@ class Scenario(Table):
     law: Component
     faults: list[Annotated[Any, DeclaredIn("mjspace.actuators.faults:Fault", optional=False)]] = []
     checks: list[Check] = []
-    metrics: list[Metric] = []
+    # Left out where there are none: such a scenario is written as before there were metrics.
+    metrics: Annotated[list[Metric], Field(exclude_if=operator.not_)] = []
     events: list[EventTable] = []
     log: LogRates = LogRates()
     dispersions: list[Dispersion] = []
@@ -175,11 +175,6 @@ class Scenario(Table):
         """Its checks and metrics, by their places."""
         found: dict[str, Measurement] = {f"checks.{n}": c for n, c in enumerate(self.checks)}
         return found | {f"metrics.{n}": metric for n, metric in enumerate(self.metrics)}
-
-    @field_serializer("metrics", mode="wrap")
-    def _where_there_are(self, metrics: Any, handler: SerializerFunctionWrapHandler) -> Any:
-        # A scenario without any is written as before there were metrics, and a campaign goes on.
-        return handler(metrics) or None
 
     @model_validator(mode="before")
     @classmethod
