@@ -19,7 +19,7 @@ _MAY_DIFFER = {"initial": _STARTS, "plant": _MASSES}
 def may_be_alike(members: Population) -> bool:
     """Return whether the members are alike, as far as the keys of their dispersions tell."""
     may_differ = {f"{table}.{key}" for table, keys in _MAY_DIFFER.items() for key in keys}
-    keys = {each.key.partition("[")[0] for each in members.dispersions}
+    keys = {key.partition("[")[0] for each in members.dispersions for key in each.all_keys}
     of_plant = any(key.startswith("plant.") for key in keys)
     return keys <= may_differ and not (of_plant and _has_effects(members.nominal))
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from mjspace.campaign.alike import may_be_alike
 from mjspace.campaign.flights import Call, fly_members, log_of
 from mjspace.campaign.members import Campaign, population
+from mjspace.campaign.sensitivity import SAMPLING, refuse_unfit
 from mjspace.campaign.store import Store
 from mjspace.errors import InputError
 from mjspace.interrupts import on_signals
@@ -65,6 +66,8 @@ def fly(
         OSError: the results cannot be written.
     """
     members = population(campaign)
+    if members.scenario.sampling == SAMPLING:
+        refuse_unfit([each.name for each in members.dispersions], campaign.count)
     store = Store(out, members)
     with store.opened():
         done = store.finished()

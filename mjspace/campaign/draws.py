@@ -9,6 +9,7 @@ import numpy as np
 from scipy import special, stats
 from scipy.stats import qmc
 
+from mjspace.campaign.sensitivity import SAMPLING, group_size
 from mjspace.contract import Array
 from mjspace.scenario.dispersions import Dispersion
 
@@ -22,8 +23,8 @@ def uniforms(
 ) -> Array:
     """Return the uniform numbers of these of the ``count`` members, (len(members), width).
 
-    A member's are the same in whatever company it is drawn. Those of ``random`` and ``sobol`` do
-    not depend on ``count`` either.
+    A member's are the same in whatever company it is drawn. Those of a Latin
+    hypercube alone depend on ``count`` as well.
     """
     width = width_of(dispersions)
     if not width or not len(members):
@@ -31,6 +32,8 @@ def uniforms(
     if sampling == "random":
         streams = [np.random.SeedSequence(seed, spawn_key=(member,)) for member in members]
         points = np.array([np.random.default_rng(stream).random(width) for stream in streams])
+    elif sampling == SAMPLING:
+        points = _exchanged(seed, members, dispersions)
     else:
         rng = np.random.default_rng(seed)
         kind = {"latin_hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol}[sampling]
@@ -41,9 +44,33 @@ def uniforms(
     return inside
 
 
+def _exchanged(seed: int, members: Sequence[int], dispersions: Sequence[Dispersion]) -> Array:
+    """Return the points of groups in which one dispersion at a time is exchanged.
+
+    The members of a group are A, B, and A with the numbers of the first dispersion as in B, of the
+    second, and so on. A and B are halves of a point of one Sobol sequence.
+    """
+    widths = [width_of([each]) for each in dispersions]
+    ends = np.cumsum(widths)
+    width, size = int(ends[-1]), group_size(len(dispersions))
+    groups = max(members) // size + 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a member alone needs those up to its own
+        pairs = qmc.Sobol(2 * width, rng=np.random.default_rng(seed)).random(groups)
+    points = np.empty((len(members), width))
+    for row, member in zip(points, members, strict=True):
+        group, place = divmod(member, size)
+        one, other = pairs[group, :width], pairs[group, width:]
+        row[:] = other if place == 1 else one
+        if place > 1:
+            part = slice(ends[place - 2] - widths[place - 2], ends[place - 2])
+            row[part] = other[part]
+    return points
+
+
 def width_of(dispersions: Sequence[Dispersion]) -> int:
     """Return how many uniform numbers a member draws."""
-    return sum(WIDTH.get(each.distribution, 1) for each in dispersions)
+    return sum(len(each.keys or ()) or WIDTH.get(each.distribution, 1) for each in dispersions)
 
 
 def values(dispersions: Sequence[Dispersion], nominal: Sequence[Any], row: Array) -> list[Any]:
@@ -53,7 +80,7 @@ def values(dispersions: Sequence[Dispersion], nominal: Sequence[Any], row: Array
     """
     found, place = [], 0
     for dispersion, own in zip(dispersions, nominal, strict=True):
-        width = WIDTH.get(dispersion.distribution, 1)
+        width = width_of([dispersion])
         found.append(value(dispersion, own, row[place : place + width]))
         place += width
     return found
@@ -63,6 +90,8 @@ def value(dispersion: Dispersion, nominal: Any, u: Array) -> Any:
     """Return the number, or the vector as a list, that the uniform numbers ``u`` make."""
     d: Any = dispersion
     match d.distribution:
+        case "normal" if d.covariance is not None:
+            return correlated(np.array(d.covariance), nominal, u)
         case "normal":
             mean = nominal if d.mean is None else d.mean
             return float(mean + d.std * special.ndtri(u[0]))
@@ -82,6 +111,17 @@ def value(dispersion: Dispersion, nominal: Any, u: Array) -> Any:
             return random_attitude(u)
         case _:
             return [float(d.radius * x) for x in direction(u)]
+
+
+def correlated(covariance: Array, mean: Sequence[float], u: Array) -> list[float]:
+    """Return normal numbers about ``mean`` (n,), of uniform numbers ``u`` (n,).
+
+    The covariance may be singular: its square root is by eigenvectors.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    found: list[float] = (np.array(mean) + root @ special.ndtri(u)).tolist()
+    return found
 
 
 def random_attitude(u: Array) -> list[float]:

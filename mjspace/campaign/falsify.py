@@ -11,7 +11,7 @@ import numpy as np
 
 from mjspace.campaign import draws, robustness
 from mjspace.campaign.flights import judged_alone, same
-from mjspace.campaign.members import Campaign, Population, population
+from mjspace.campaign.members import Campaign, Population
 from mjspace.campaign.search import minimize
 from mjspace.campaign.written import write_scenario
 from mjspace.contract import Array
@@ -58,13 +58,13 @@ class Falsified:
 
 
 def falsify(
-    campaign: Campaign,
+    members: Population,
     *,
     go_on: bool = False,
     processes: int | None = None,
     told: Told = lambda flown, failed: None,
 ) -> Falsified:
-    """Search for the flight with the least margin, in at most ``campaign.count`` flights.
+    """Search for the flight with the least margin, in at most as many flights as ``members``.
 
     It ends with the first generation in which one fails, unless it is to ``go_on``, and makes the
     worst minimal. What is drawn keeps within three sigma.
@@ -74,7 +74,7 @@ def falsify(
         FlightError: a process was killed.
         Interrupted: a signal ended it before anything was flown.
     """
-    members = population(campaign)
+    campaign = members.campaign
     if not members.dispersions:
         raise InputError(f"{members.path}: dispersions: none, there is nothing to search")
     if not members.scenario.checks:

@@ -17,6 +17,7 @@ from mjspace.contract import Array
 from mjspace.errors import FlightError, InputError
 from mjspace.interrupts import Interrupted
 from mjspace.runner.checks import Judge, Verdict
+from mjspace.runner.metrics import Measured
 from mjspace.runner.output import LOG
 from mjspace.runner.run import fly_to_log, refuse_unjudgeable
 from mjspace.simulation.assembly import Assembly
@@ -32,6 +33,7 @@ class Flown:
     member: int
     draws: list[Any]
     verdicts: list[Verdict]
+    metrics: list[Measured]
     trouble: str
     """Why it ended early; empty for a flight that reached its end."""
     seconds: float
@@ -131,14 +133,15 @@ def _side_by_side(group: Sequence[_Member]) -> list[Flown]:
     if any(each.assembly.vehicle is not first.vehicle for each in group):
         models = [each.assembly.vehicle.model for each in group]
         start = replace(start, models=models)
-    verdicts, trouble = judged(first, start, numbers)
+    judges, trouble = judged(first, start, numbers)
     if trouble and len(group) > 1:
         half = len(group) // 2
         return _side_by_side(group[:half]) + _side_by_side(group[half:])
     share = (time.perf_counter() - began) / len(group)
+    shown = [(judge.verdicts(), judge.metrics()) for judge in judges] or [([], [])] * len(group)
     return [
-        Flown(each.number, each.draws, judged, trouble, each.seconds + share)
-        for each, judged in zip(group, verdicts, strict=True)
+        Flown(each.number, each.draws, *found, trouble, each.seconds + share)
+        for each, found in zip(group, shown, strict=True)
     ]
 
 
@@ -149,14 +152,14 @@ def judged_alone(assembly: Assembly, member: int = 0) -> tuple[list[Verdict], st
         InputError: a check names no signal of the flight.
         FlightError: it cannot begin.
     """
-    (verdicts,), trouble = judged(assembly, first_start(assembly, [member]), [member])
-    return verdicts, trouble
+    judges, trouble = judged(assembly, first_start(assembly, [member]), [member])
+    return [verdict for judge in judges for verdict in judge.verdicts()], trouble
 
 
-def judged(
-    assembly: Assembly, start: Start, members: Sequence[int]
-) -> tuple[list[list[Verdict]], str]:
-    """Fly the members and return the verdicts of each, and why the flight ended early.
+def judged(assembly: Assembly, start: Start, members: Sequence[int]) -> tuple[list[Judge], str]:
+    """Fly the members and return the judge of each, and why the flight ended early.
+
+    There is none where it ended before the first block.
 
     Raises:
         InputError: a check names no signal of the flight.
@@ -169,12 +172,14 @@ def judged(
             if not judges:
                 refuse_unjudgeable(assembly, block)
                 topics = shapes(block)
-                judges = [Judge(scenario.checks, scenario.events, topics) for _ in members]
+                metrics = scenario.metrics, assembly.metrics
+                what = scenario.checks, scenario.events, topics, *metrics, scenario.rates.control
+                judges = [Judge(*what) for _ in members]
             for vehicle, judge in enumerate(judges):
                 judge.add(block.time, one_vehicle(block, vehicle))
     except FlightError as error:
         trouble = str(error)
-    return [judge.verdicts() for judge in judges] or [[] for _ in members], trouble
+    return judges, trouble
 
 
 def _keep_log(members: Population, flown: Flown, path: Path) -> None:

@@ -3,17 +3,18 @@
 import json
 import os
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
-from mjspace.campaign.report import Answer, CheckFigures
-from mjspace.campaign.results import DESCRIPTION, JudgedResults
+from mjspace.campaign.report import Answer, CheckFigures, MetricFigures
+from mjspace.campaign.results import DESCRIPTION, JudgedResults, value_column
 from mjspace.contract import Array
 from mjspace.reporting import page
 from mjspace.reporting.charts import Bound, Chart, Series
 from mjspace.scenario.dispersions import Dispersion
-from mjspace.scenario.scenario import Check
+from mjspace.scenario.metrics import Metric
 
 _BINS = 40  # at most
 _DRAWS = 12  # of a tornado
@@ -33,8 +34,18 @@ def write(results: JudgedResults, found: Answer, output: Path) -> None:
     """
     page.require_html(output)
     charts = [
-        _histogram(results.column(f"{name}: measured"), check, figures)
+        _histogram(
+            f"{figures.name} {figures.bound}",
+            results.column(f"{name}: measured"),
+            f"measured: {check.formula or f'{check.statistic} of {check.signal}'}",
+            check.below,
+            check.above,
+        )
         for (name, check), figures in zip(results.checks.items(), found.checks, strict=True)
+    ]
+    charts += [
+        _histogram(m.name, results.column(value_column(m.name)), _meaning(m))
+        for m in results.scenario.metrics
     ]
     description = json.loads((results.folder / DESCRIPTION).read_text(encoding="utf-8"))
     software = description.get("software")
@@ -46,7 +57,10 @@ def write(results: JudgedResults, found: Answer, output: Path) -> None:
         scenario=results.scenario,
         found=found,
         checks=list(zip(results.checks.values(), found.checks, strict=True)),
-        tornados=[(figures, _tornado(figures)) for figures in found.checks],
+        tornados=[
+            *((f"{f.name} {f.bound}", _tornado(f)) for f in found.checks),
+            *((f"{f.name}, a metric", _tornado(f)) for f in found.metrics),
+        ],
         worst=[(each, _link(Path(each.log), output) if each.log else "") for each in found.worst],
         dispersions=[_parameters(dispersion) for dispersion in results.scenario.dispersions],
         software=software if isinstance(software, dict) else {},
@@ -55,8 +69,10 @@ def write(results: JudgedResults, found: Answer, output: Path) -> None:
     )
 
 
-def _histogram(measured: Array, check: Check, figures: CheckFigures) -> Chart:
-    """Return how the measured values are distributed, with the bounds."""
+def _histogram(
+    title: str, measured: Array, what: str, below: float | None = None, above: float | None = None
+) -> Chart:
+    """Return how the measured values are distributed, with the bounds of a check."""
     values = measured[np.isfinite(measured)]
     # Values that are equal but for the last digits have no bins of their own.
     if len(values) and np.ptp(values) <= 1e-9 * np.abs(values).max():
@@ -65,19 +81,23 @@ def _histogram(measured: Array, check: Check, figures: CheckFigures) -> Chart:
     counts, edges = np.histogram(values, bins=few)
     bounds = [
         Bound(f"{sign} {bound:.4g}", (float(bound), 0.0), (float(bound), np.inf))
-        for sign, bound in (("<", check.below), (">", check.above))
+        for sign, bound in (("<", below), (">", above))
         if bound is not None
     ]
     centers = 0.5 * (edges[:-1] + edges[1:])
     series = Series("members", centers, counts.astype(float), None)
-    what = f"measured: {check.statistic} of {check.signal}"
-    return Chart(
-        f"{figures.name} {figures.bound}", "members", [series], "bars", what, bounds=bounds
-    )
+    return Chart(title, "members", [series], "bars", what, bounds=bounds)
 
 
-def _tornado(figures: CheckFigures) -> list[tuple[str, float]]:
-    """Return the draws on which a check depends, the strongest first."""
+def _meaning(metric: Metric) -> str:
+    """Return what the number is."""
+    if metric.signal is None:
+        return f"{metric.function} of {', '.join(metric.signals)}"
+    return f"{metric.statistic} of {metric.signal}"
+
+
+def _tornado(figures: CheckFigures | MetricFigures) -> list[tuple[str, float]]:
+    """Return the draws on which a check or a metric depends, the strongest first."""
     known = [(draw, value) for draw, value in figures.correlations.items() if value is not None]
     return sorted(known, key=lambda each: -abs(each[1]))[:_DRAWS]
 
@@ -122,9 +142,14 @@ def _link(log: Path, output: Path) -> str:
 
 def _parameters(dispersion: Dispersion) -> tuple[str, str, str]:
     """Return the key, the distribution and its parameters."""
-    table = dispersion.model_dump(exclude_none=True, exclude={"key", "distribution"})
-    words = (
-        f"{key} {', '.join(f'{x:.6g}' for x in (value if isinstance(value, list) else [value]))}"
-        for key, value in table.items()
-    )
-    return dispersion.key, dispersion.distribution, "; ".join(words)
+    table = dispersion.model_dump(exclude_none=True, exclude={"key", "keys", "distribution"})
+    words = (f"{key} {_numbers(value)}" for key, value in table.items())
+    return dispersion.name, dispersion.distribution, "; ".join(words)
+
+
+def _numbers(value: Any) -> str:
+    """Return a number, a list or a matrix of them, by rows."""
+    if not isinstance(value, list):
+        return f"{value:.6g}"
+    rows = any(isinstance(each, list) for each in value)
+    return (" / " if rows else ", ").join(map(_numbers, value))

@@ -14,7 +14,7 @@ import numpy as np
 from mjspace.campaign import draws
 from mjspace.errors import FlightError, InputError, input_error_at, nearest
 from mjspace.scenario.construct import plain
-from mjspace.scenario.dispersions import Dispersion, refuse_mode_outside
+from mjspace.scenario.dispersions import Dispersion, path_of, refuse_mode_outside
 from mjspace.scenario.loading import read, to_toml, validated
 from mjspace.scenario.scenario import Scenario
 from mjspace.simulation.assembly import Assembly, assemble
@@ -72,8 +72,12 @@ class Population:
 
     @cached_property
     def own_values(self) -> list[Any]:
-        """The scenario's own value of each dispersed key."""
-        return [value_at(self.written, each.path) for each in self.dispersions]
+        """The scenario's own value of each dispersion; of a set a list."""
+        found = []
+        for each in self.dispersions:
+            own = [value_at(self.written, path) for path in each.paths]
+            found.append(own[0] if each.keys is None else own)
+        return found
 
     @cached_property
     def written(self) -> Any:
@@ -121,7 +125,8 @@ class Population:
         table = copy.deepcopy(dict(self.table))
         table.pop("dispersions", None)
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
-            put(table, self.written, dispersion.path, _with_unit(dispersion, value))
+            for key, part in dispersion.by_key(value).items():
+                put(table, self.written, path_of(key), _with_unit(dispersion, part))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the scenario's own have been shown
@@ -134,7 +139,8 @@ class Population:
             raise InputError(f"{name}: {error}") from error
         written = plain(assembly.scenario.model_dump(mode="python"))
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
-            require_arrival(assembly, written, dispersion, value, name)
+            for key, part in dispersion.by_key(value).items():
+                require_arrival(assembly, written, dispersion, key, part, name)
         return assembly
 
     def _same_vehicle(self, scenario: Scenario) -> Any:
@@ -158,8 +164,9 @@ def population(campaign: Campaign, *, alike: bool = False) -> Population:
         raise InputError(f"{path}: dispersions: none, and no noise: every member would be alike")
     found = Population(campaign, table, path, origins, nominal)
     for number, dispersion in enumerate(scenario.dispersions):
-        with input_error_at(f"{path}: dispersions.{number}.key"):
-            _refuse_unfit(dispersion, value_at(found.written, dispersion.path))
+        with input_error_at(f"{path}: dispersions.{number}.{'keys' if dispersion.keys else 'key'}"):
+            for key in dispersion.all_keys:
+                _refuse_unfit(dispersion, key, value_at(found.written, path_of(key)))
     return found
 
 
@@ -202,44 +209,45 @@ def put(table: Any, written: Any, path: Sequence[str], value: Any) -> None:
 
 
 def require_arrival(
-    assembly: Assembly, written: Any, dispersion: Dispersion, drawn: Any, name: str
+    assembly: Assembly, written: Any, dispersion: Dispersion, key: str, drawn: Any, name: str
 ) -> None:
-    """Read the value back from what is to fly, and refuse another than was drawn.
+    """Read the value of a ``key`` back from what is to fly, and refuse another than was drawn.
 
     ``written`` is the assembly's scenario with every default written out.
 
     Raises:
         FlightError: with the key and both values.
     """
-    flown = value_at(written, dispersion.path)
+    flown = value_at(written, path_of(key))
     period = _unit(dispersion) == "Hz" and flown == 1.0 / drawn
     arrived = flown == drawn or period
-    name, _, index = dispersion.key.partition("[")
-    if arrived and name in STATE:
-        where, part = STATE[name]
+    place, _, index = key.partition("[")
+    if arrived and place in STATE:
+        where, part = STATE[place]
         flown = getattr(assembly, where)[part]
         flown = float(flown[int(index[:-1])]) if index else flown.tolist()
         # A quaternion is normalized.
-        arrived = bool(np.allclose(flown, drawn, rtol=1e-3 * ("attitude" in name), atol=0.0))
+        arrived = bool(np.allclose(flown, drawn, rtol=1e-3 * ("attitude" in place), atol=0.0))
     if not arrived:
         raise FlightError(
-            f"dispersion {dispersion.key} did not arrive: {name} drew {drawn}, and would fly with "
-            f"{flown}"
+            f"dispersion {key} did not arrive: {name} drew {drawn}, and would fly with {flown}"
         )
 
 
-def _refuse_unfit(dispersion: Dispersion, own: Any) -> None:
+def _refuse_unfit(dispersion: Dispersion, key: str, own: Any) -> None:
     """Refuse a distribution that the scenario's own value of the key does not go with."""
     if dispersion.distribution in draws.WIDTH:
         size = 4 if dispersion.distribution == "random_attitude" else 3
         if not (own is None or (isinstance(own, list) and len(own) == size)):
-            raise ValueError(f"{dispersion.key} is {own!r}, should be {size} numbers")
+            raise ValueError(f"{key} is {own!r}, should be {size} numbers")
         return
     if own is not None and (isinstance(own, bool) or not isinstance(own, int | float)):
-        raise ValueError(f"{dispersion.key} is {own!r}, should be a number: give an index, [0]")
+        raise ValueError(f"{key} is {own!r}, should be a number: give an index, [0]")
+    if dispersion.keys is not None and own is None:
+        raise ValueError(f"{key} has no value of its own, about which it could be drawn")
     takes = {"normal": "mean", "triangular": "mode"}.get(dispersion.distribution)
-    if takes and own is None and getattr(dispersion, takes) is None:
-        raise ValueError(f"{dispersion.key} has no value of its own: give {takes}")
+    if dispersion.keys is None and takes and own is None and getattr(dispersion, takes) is None:
+        raise ValueError(f"{key} has no value of its own: give {takes}")
     refuse_mode_outside(dispersion, own if dispersion.mode is None else dispersion.mode)
 
 

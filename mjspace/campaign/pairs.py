@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from mjspace.campaign.results import Results
+from mjspace.campaign.results import Results, value_column
 from mjspace.campaign.statistics import CONFIDENCE
 from mjspace.contract import Array
 from mjspace.errors import InputError
@@ -16,15 +16,15 @@ MARGIN = ": margin"
 
 
 @dataclass(frozen=True)
-class PairedCheck:
-    """A check that both campaigns have, over the members of which both measured it."""
+class Paired:
+    """A check or a metric that both campaigns have, over the members of which both measured it."""
 
     name: str
     members: int
-    better: float
-    """Share of the members with a larger margin in the second."""
+    larger: float
+    """Share of the members with a larger margin, or value, in the second."""
     difference: float
-    """Median of the second's margin less the first's, in the signal's unit."""
+    """Median of the second's margin or value less the first's, in the signal's unit."""
     interval: tuple[float, float]
     """Of the median, at the confidence: by order statistics, for any distribution. Of fewer than
     six members all that there is, which has less confidence."""
@@ -40,7 +40,8 @@ class Pairs:
     """In the first alone."""
     second: int
     neither: int
-    checks: list[PairedCheck]
+    checks: list[Paired]
+    metrics: list[Paired]
     confidence: float = CONFIDENCE
 
     @property
@@ -91,35 +92,43 @@ def compare(first: Path, second: Path) -> Pairs:
                 "both with the same seed, sampling and dispersions"
             )
     well, good = one.column("passed")[i] > 0.5, two.column("passed")[j] > 0.5
-    checks = [name for name in one.columns if name.endswith(MARGIN) and name in two.columns]
-    paired = (_paired(n, one.column(n)[i], two.column(n)[j]) for n in checks)
+
+    def paired(ending: str) -> list[Paired]:
+        names = [name for name in one.columns if name.endswith(ending) and name in two.columns]
+        found = (
+            _paired(name.removesuffix(ending), one.column(name)[i], two.column(name)[j])
+            for name in names
+        )
+        return [each for each in found if each is not None]
+
     return Pairs(
         both=int(np.sum(well & good)),
         first=int(np.sum(well & ~good)),
         second=int(np.sum(~well & good)),
         neither=int(np.sum(~well & ~good)),
-        checks=[check for check in paired if check is not None],
+        checks=paired(MARGIN),
+        metrics=paired(value_column("")),
     )
 
 
-def _paired(column: str, one: Array, two: Array) -> PairedCheck | None:
-    """Return how margins compare; None where no member has both."""
+def _paired(name: str, one: Array, two: Array) -> Paired | None:
+    """Return how margins or values compare; None where no member has both."""
     differences = np.sort((two - one)[np.isfinite(two - one)])
     count = len(differences)
     if not count:
         return None
     low = max(int(stats.binom.ppf(0.5 - 0.5 * CONFIDENCE, count, 0.5)) - 1, 0)
-    return PairedCheck(
-        name=column.removesuffix(MARGIN),
+    return Paired(
+        name=name,
         members=count,
-        better=float(np.mean(differences > 0.0)),
+        larger=float(np.mean(differences > 0.0)),
         difference=float(np.median(differences)),
         interval=(float(differences[low]), float(differences[count - 1 - low])),
     )
 
 
 def _drawn(results: Results) -> list[str]:
-    """Return the names of what was drawn: the columns ahead of the checks."""
-    names = results.columns
-    ends = (n for n, name in enumerate(names) if name.endswith(": measured") or name == "trouble")
+    """Return the names of what was drawn: the columns ahead of the checks and metrics."""
+    names, after = results.columns, (": measured", value_column(""), "trouble")
+    ends = (n for n, name in enumerate(names) if name.endswith(after))
     return names[names.index("passed") + 1 : next(ends)] if names else []

@@ -25,9 +25,19 @@ def draw_columns(scenario: Scenario) -> list[str]:
     found: list[str] = []
     for dispersion in scenario.dispersions:
         count = {"random_attitude": 4, "on_sphere": 3}.get(dispersion.distribution)
-        key = dispersion.key
-        found += [key] if count is None else [f"{key}[{i}]" for i in range(count)]
+        for key in dispersion.all_keys:
+            found += [key] if count is None else [f"{key}[{i}]" for i in range(count)]
     return found
+
+
+def value_column(metric: str) -> str:
+    """Return the name of the column of the metric's values."""
+    return f"{metric}: value"
+
+
+def missing_column(metric: str) -> str:
+    """Return the name of the column that says why a member has no value of the metric."""
+    return f"{metric}: missing"
 
 
 def checks_of(scenario: Scenario) -> dict[str, Check]:
@@ -147,7 +157,12 @@ def results_in(folder: Path) -> JudgedResults:
     of_checks = [
         f"{n}: {what}" for n in results.checks for what in ("measured", "margin", "verdict")
     ]
-    for name in ("passed", "trouble", WALL_TIME, *results.draws, *of_checks):
+    of_metrics = [
+        column(metric.name)
+        for metric in scenario.metrics
+        for column in (value_column, missing_column)
+    ]
+    for name in ("passed", "trouble", WALL_TIME, *results.draws, *of_checks, *of_metrics):
         if name not in columns:
             raise InputError(f"{folder}: its members lack {name!r}")
     return results

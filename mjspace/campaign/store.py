@@ -11,7 +11,13 @@ from typing import Any
 
 from mjspace.campaign.flights import Flown
 from mjspace.campaign.members import Population
-from mjspace.campaign.results import DESCRIPTION, WALL_TIME, JudgedResults
+from mjspace.campaign.results import (
+    DESCRIPTION,
+    WALL_TIME,
+    JudgedResults,
+    missing_column,
+    value_column,
+)
 from mjspace.errors import InputError
 from mjspace.log import lock
 from mjspace.log.provenance import software
@@ -36,6 +42,9 @@ class Store(JudgedResults):
         for name in self.checks:
             kinds[f"{name}: measured"] = kinds[f"{name}: margin"] = pyarrow.float64()
             kinds[f"{name}: verdict"] = pyarrow.string()
+        for metric in members.scenario.metrics:
+            kinds[value_column(metric.name)] = pyarrow.float64()
+            kinds[missing_column(metric.name)] = pyarrow.string()
         kinds |= {"trouble": pyarrow.string(), WALL_TIME: pyarrow.float64()}
         self._schema = pyarrow.schema(list(kinds.items()))
 
@@ -126,6 +135,11 @@ class Store(JudgedResults):
             row[f"{name}: measured"] = _number(verdict.measured)
             row[f"{name}: margin"] = _number(margin(verdict.check, verdict.measured))
             row[f"{name}: verdict"] = verdict.outcome
+        for metric in self.scenario.metrics:
+            row[value_column(metric.name)] = row[missing_column(metric.name)] = None
+        for measured in flown.metrics:
+            row[value_column(measured.metric.name)] = _number(measured.value)
+            row[missing_column(measured.metric.name)] = measured.missing or None
         return row
 
     def _empty(self) -> Any:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mjspace.campaign import robustness
-from mjspace.campaign.flights import judged_alone, same
+from mjspace.campaign.flights import judged, same
 from mjspace.campaign.members import Campaign, population, value_at
 from mjspace.campaign.requirement import objective, requirement
 from mjspace.campaign.search import minimize
@@ -22,7 +22,9 @@ from mjspace.interrupts import Interrupted, on_signals
 from mjspace.runner import workers
 from mjspace.scenario.dispersions import path_of
 from mjspace.scenario.loading import validated
+from mjspace.scenario.metrics import Metric
 from mjspace.simulation.assembly import assemble
+from mjspace.simulation.initial_state import first_start
 from mjspace.units import to_si
 
 WORSE = 1e9
@@ -63,16 +65,27 @@ class Goal:
     """What is minimized, and what has to hold."""
 
     minimized: str
-    """As ``rms(truth.attitude_error)``."""
+    """As ``rms(truth.attitude_error)``; or the name of a metric of the scenario."""
     required: tuple[str, ...]
     """As ``requirement`` reads them."""
 
-    def checks(self) -> list[dict[str, Any]]:
-        """Return the checks of each flight, that of the objective first: whatever it measures."""
+    def checks(self, metrics: Sequence[Metric]) -> list[dict[str, Any]]:
+        """Return the checks of each flight; that of the objective first, where it is no metric.
+
+        Raises:
+            InputError: one is not of the form that it should have.
+        """
+        found = [requirement(text) for text in self.required]
+        tables = [check.model_dump(exclude_defaults=True) for check in found]
+        if self.is_one_of(metrics):
+            return tables
         statistic, signal = objective(self.minimized, "--minimize")
         table = {"name": self.minimized, "signal": signal, "statistic": statistic, "below": _ANY}
-        found = [requirement(text) for text in self.required]
-        return [table, *(check.model_dump(exclude_defaults=True) for check in found)]
+        return [table, *tables]
+
+    def is_one_of(self, metrics: Sequence[Metric]) -> bool:
+        """Return whether a metric is minimized."""
+        return any(metric.name == self.minimized for metric in metrics)
 
 
 @dataclass(frozen=True)
@@ -150,7 +163,7 @@ def tune(
             if isinstance(found, bool) or not (found is None or isinstance(found, int | float)):
                 raise ValueError(f"{each.key} is {found!r}, should be a number")
             own[each.key] = found
-        if any(each.path == dispersion.path for dispersion in members.dispersions):
+        if any(each.path in dispersion.paths for dispersion in members.dispersions):
             raise InputError(f"--vary {each.key}: it is dispersed")
     members.with_values({each.path: each.written(each.low) for each in what}).member(0)
     trials: dict[tuple[float, ...], float] = {}
@@ -223,21 +236,27 @@ def _objective(
     campaign, identity, goal, values, number = argument
     members = same(campaign, identity, alike=True)
     changed = members.with_values({path_of(key): value for key, value in values.items()})
-    changed.table["checks"] = goal.checks()  # type: ignore[index]
+    metrics = members.scenario.metrics
+    changed.table["checks"] = goal.checks(metrics)  # type: ignore[index]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             assembly, _ = changed.member(number)
-            verdicts, trouble = judged_alone(assembly, number)
+            judges, trouble = judged(assembly, first_start(assembly, [number]), [number])
     except FlightError:
         return 10.0 * WORSE
     if trouble:
         return 10.0 * WORSE
-    value, *required = verdicts
+    (judge,) = judges
+    required = judge.verdicts()
+    if goal.is_one_of(metrics):
+        value = next(m.value for m in judge.metrics() if m.metric.name == goal.minimized)
+    else:
+        value = required.pop(0).measured
     margin = robustness.of_flight(required) if required else 0.0
-    if math.isnan(value.measured) or margin < 0.0:
+    if math.isnan(value) or margin < 0.0:
         return WORSE * (1.0 + min(-margin, 8.0))
-    return value.measured
+    return value
 
 
 def write(campaign: Campaign, values: Mapping[str, float], folder: Path) -> Path:

@@ -137,16 +137,21 @@ def compare_campaigns(first: Path, second: Path, as_json: bool) -> None:
         f"success rate of the second less the first's: {pairs.difference:+.4g}, {percent} interval "
         f"{low:+.4g} to {high:+.4g}; by chance alone with probability {pairs.probability:.2g}"
     )
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("margin of check")
-    for title in ("members", "better in the second", "median difference", f"{percent} interval"):
-        table.add_column(title, justify="right")
-    for check in pairs.checks:
-        table.add_row(
-            escape(printable(check.name)),
-            str(check.members),
-            f"{100.0 * check.better:.3g} %",
-            f"{check.difference:+.3g}",
-            f"{check.interval[0]:+.3g} to {check.interval[1]:+.3g}",
-        )
-    console.print(table)
+    both = ("margin of check", "better", pairs.checks), ("metric", "larger", pairs.metrics)
+    for what, word, paired in both:
+        if not paired:
+            continue
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        table.add_column(what)
+        titles = ("members", f"{word} in the second", "median difference", f"{percent} interval")
+        for title in titles:
+            table.add_column(title, justify="right")
+        for each in paired:
+            table.add_row(
+                escape(printable(each.name)),
+                str(each.members),
+                f"{100.0 * each.larger:.3g} %",
+                f"{each.difference:+.3g}",
+                f"{each.interval[0]:+.3g} to {each.interval[1]:+.3g}",
+            )
+        console.print(table)

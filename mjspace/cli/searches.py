@@ -43,15 +43,14 @@ def falsify(
 
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
-    what = Campaign(scenario, tuple(overrides), count, seed, trust)
-    members = population(what)
+    members = population(Campaign(scenario, tuple(overrides), count, seed, trust))
     last = f"counterexample-seed-{members.scenario.seed}"
     folder = output_folder(out, members.scenario.name, last)
     refuse_existing(folder / LOG, force=False)
     with cause_shown(traceback), count_bar(count, "flying") as told:
-        found = search(what, go_on=go_on, processes=workers, told=told)
+        found = search(members, go_on=go_on, processes=workers, told=told)
     result = None if found.minimal is None else write(members, found.minimal, folder)
-    keys = [dispersion.key for dispersion in members.dispersions]
+    keys = [dispersion.name for dispersion in members.dispersions]
     minimal = [None] * len(keys) if found.minimal is None else found.minimal.draws
     rows = list(zip(keys, nominal_draws(members), found.worst.draws, minimal, strict=True))
     if as_json:
@@ -122,7 +121,10 @@ def tune(
     ],
     minimized: Annotated[
         str,
-        typer.Option("--minimize", help="'rms(truth.attitude_error)', its mean over draws."),
+        typer.Option(
+            "--minimize",
+            help="'rms(truth.attitude_error)', or a metric's name: its mean over draws.",
+        ),
     ],
     require: Annotated[
         list[str],
@@ -156,9 +158,10 @@ def tune(
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
     chosen, goal = [varied(text) for text in vary], Goal(minimized, tuple(require))
-    goal.checks()  # refuses what is none, before anything flies
     what = Campaign(scenario, tuple(overrides), count, seed, trust)
-    folder = output_folder(out, population(what, alike=True).scenario.name, "tuned")
+    tuned = population(what, alike=True).scenario
+    goal.checks(tuned.metrics)  # refuses what is none, before anything flies
+    folder = output_folder(out, tuned.name, "tuned")
     if (folder / SCENARIO).exists():
         raise InputError(f"{folder / SCENARIO}: is there already: give another folder by --out")
     with cause_shown(traceback), count_bar(count * draws, "flying") as told:

@@ -31,10 +31,13 @@ class Bound:
 def bounds(panel: Panel, checks: Sequence[Check], log: Log) -> Iterator[Bound]:
     """Yield the bounds that can be drawn on ``panel``.
 
-    Those of another signal cannot, nor those of an error from a target, of a vector's norm, in a
-    window counted from an event, and of a drift from a later instant than the panel's.
+    Those of another signal or of a formula cannot, nor those of an error from a target, of a
+    vector's norm, in a window counted from an event, and of a drift from a later instant than the
+    panel's.
     """
     for check in checks:
+        if check.formula is not None:
+            continue
         topic, field, part = find_signal(log.topics, check.signal)
         component = part.start
         is_drift = check.statistic == "drift"

@@ -41,6 +41,8 @@ class Flight:
     log: Log
     scenario: Scenario
     checks: list[CheckRow]
+    metrics: list[str]
+    """What each metric came to, a line each."""
     passed: bool
     trouble: str
     events: list[Event]

@@ -1,20 +1,23 @@
-"""Judging a flight: each check is a statistic of one logged signal over a window of time."""
+"""Judging a flight: a check is a statistic of one signal over a window, or a formula of several."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
-from mjspace.contract import TICK, Array
+from mjspace.contract import Array
 from mjspace.errors import InputError, input_error_at
+from mjspace.runner.formula import Monitor, formula_of
+from mjspace.runner.metrics import Functions, Measured, Meter
 from mjspace.runner.statistic import Statistic
-from mjspace.scenario.scenario import Check, EventTable, SignalRegion
+from mjspace.runner.windows import Rows, Windows, numbers_of
+from mjspace.scenario.metrics import Metric
+from mjspace.scenario.scenario import Check, EventTable
 from mjspace.signals import Topics, find_signal, magnitude
 from mjspace.units import Quantity, Unit
-
-Rows = Mapping[str, Mapping[str, Array]]
 
 Outcome = Literal["PASS", "FAIL", "not measured"]
 
@@ -80,6 +83,8 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
         InputError: the first of them, with the near names.
     """
     for number, check in enumerate(checks):
+        if check.formula is not None:
+            continue
         with input_error_at(f"checks.{number}.signal"):
             _, _, part = find_signal(topics, check.signal)
         size = part.stop - part.start
@@ -88,11 +93,35 @@ def refuse_unknown(checks: Sequence[Check], topics: Topics) -> None:
             raise InputError(f"checks.{number}.target: {count} numbers, {check.signal} has {size}")
 
 
+def refuse_unfit_formulas(
+    checks: Sequence[Check],
+    topics: Topics,
+    units: Mapping[str, Mapping[str, Unit]],
+    period: float,
+) -> None:
+    """Refuse formulas of signals that there are not, or with numbers of another dimension.
+
+    Raises:
+        InputError: the first of them.
+    """
+    for number, check in enumerate(checks):
+        if check.formula is None or check.signals is None:
+            continue
+        with input_error_at(f"checks.{number}.formula"):
+            for atom in formula_of(check, topics, period).atoms:
+                topic, field, _ = find_signal(topics, check.signals[atom.name])
+                unit, bound = units.get(topic, {}).get(field), atom.bound
+                if unit and isinstance(bound, Quantity) and bound.unit != unit.si:
+                    what = f"{bound:.6g} {bound.unit} for {atom.name}"
+                    raise ValueError(f"got {what}, should be in {unit.si}")
+
+
 def refuse_other_dimensions(
     checks: Sequence[Check],
     events: Sequence[EventTable],
     topics: Topics,
     units: Mapping[str, Mapping[str, Unit]],
+    metrics: Sequence[Metric] = (),
 ) -> None:
     """Refuse bounds and targets that measure something else than their signal.
 
@@ -102,9 +131,14 @@ def refuse_other_dimensions(
     Raises:
         InputError: the first of them, with both units.
     """
-    regions: dict[str, SignalRegion] = {f"checks.{n}": check for n, check in enumerate(checks)}
-    regions |= {f"events.{n}": event for n, event in enumerate(events)}
+    regions: dict[str, Check | EventTable | Metric] = {
+        **{f"checks.{n}": check for n, check in enumerate(checks)},
+        **{f"events.{n}": event for n, event in enumerate(events)},
+        **{f"metrics.{n}": metric for n, metric in enumerate(metrics)},
+    }
     for place, region in regions.items():
+        if not region.signal:  # a formula, or a function
+            continue
         topic, field, _ = find_signal(topics, region.signal)
         unit = units.get(topic, {}).get(field)
         if unit is None:
@@ -120,78 +154,112 @@ def refuse_other_dimensions(
 
 
 class Judge:
-    """The checks of one vehicle's flight, judged as it flies: on every control period.
+    """The checks and metrics of one vehicle's flight, followed on every control period.
 
     A vehicle over a ground is checked for ``NO_CRASH`` as well.
     """
 
     def __init__(
-        self, checks: Sequence[Check], events: Sequence[EventTable], topics: Topics
+        self,
+        checks: Sequence[Check],
+        events: Sequence[EventTable],
+        topics: Topics,
+        metrics: Sequence[Metric] = (),
+        functions: Functions = MappingProxyType({}),
+        period: float = math.nan,
     ) -> None:
         """Begin a flight with these ``topics``.
 
-        ``events`` are the scenario's, which checks may count from; one that never happens leaves
-        nothing to measure.
+        ``events`` are the scenario's, which checks and metrics may count from; one that never
+        happens leaves nothing to measure. ``functions`` are those of the metrics, the control
+        ``period`` [s] is for formulas.
 
         Raises:
-            ValueError: a check or an event that it counts from names a signal that is not there.
+            ValueError: a check, a metric, or an event that one counts from names a signal that is
+                not there.
         """
         if "crash" in topics.get("/truth", {}):
             own = any(check.signal == NO_CRASH.signal for check in checks)
             checks = checks if own else [*checks, NO_CRASH]
-        named = [name for check in checks for name in (check.since, check.until) if name]
-        self._events = {
-            e.name: (e, find_signal(topics, e.signal)) for e in events if e.name in named
-        }
-        self._happened = dict.fromkeys(self._events, math.nan)
-        self._measured = [
-            (check, find_signal(topics, check.signal), Statistic(check)) for check in checks
-        ]
+        self._windows = Windows([*checks, *metrics], events, topics)
+        self._measured = [(check, _gathered(check, topics, period)) for check in checks]
+        self._meter = Meter(metrics, functions, topics)
 
     def add(self, time: Array, rows: Rows) -> None:
         """Go on with n > 0 control periods at ``time`` [s]; ``rows[topic][field]`` is (n, ...)."""
-        stamps = np.rint(time * 1e9)  # as they stand in the log
-        for name, (event, signal) in self._events.items():
-            if math.isnan(self._happened[name]):
-                inside = event.admits(magnitude(_numbers(rows, signal)))
-                if inside.any():
-                    self._happened[name] = float(stamps[np.argmax(inside)] / 1e9)
-        for check, signal, statistic in self._measured:
-            start, end = _window(check, self._happened)
-            low = np.searchsorted(stamps, np.rint(start * 1e9), "left")
-            high = np.searchsorted(stamps, np.rint(end * 1e9), "right")
-            if low < high:
-                statistic.add(_numbers(rows, signal)[low:high])
+        self._windows.add(time, rows)
+        for check, gathered in self._measured:
+            part = self._windows.part(check)
+            if part.start < part.stop:
+                gathered.add(rows, part)
+        self._meter.add(self._windows, time, rows)
 
     def verdicts(self) -> list[Verdict]:
         """Return the verdict of each check on what has been flown so far."""
-        return [self._verdict(check, statistic) for check, _, statistic in self._measured]
+        return [self._verdict(check, gathered) for check, gathered in self._measured]
 
-    def _verdict(self, check: Check, statistic: Statistic) -> Verdict:
-        for name in (check.since, check.until):
-            if name and math.isnan(self._happened[name]):
-                return Verdict(check, math.nan, f"event {name!r} never happened")
-        if not statistic.count:
-            start, end = _window(check, self._happened)
-            until = "the end" if end == math.inf else f"{end:.6g} s"
-            return Verdict(check, math.nan, f"no sample from {start:.6g} s to {until}")
-        measured = statistic.value()
-        missing = f"{check.signal} is not a number" if math.isnan(measured) else ""
-        return Verdict(check, measured, missing)
+    def metrics(self) -> list[Measured]:
+        """Return what each metric came to in what has been flown so far."""
+        return self._meter.measured(self._windows)
 
-
-def _numbers(rows: Rows, signal: tuple[str, str, slice]) -> Array:
-    """Return the signal's numbers (n, k)."""
-    topic, field, part = signal
-    values = rows[topic][field]
-    return values.reshape(len(values), -1)[:, part]
+    def _verdict(self, check: Check, gathered: "_OfSignal | _OfFormula") -> Verdict:
+        if never := self._windows.never(check):
+            return Verdict(check, math.nan, never)
+        if not gathered.begun:
+            return Verdict(check, math.nan, self._windows.without_sample(check))
+        measured = gathered.value()
+        if measured is None:
+            return Verdict(check, math.nan, "the flight ends before what the formula looks ahead")
+        of = check.signal or "the formula"
+        return Verdict(check, measured, f"{of} is not a number" if math.isnan(measured) else "")
 
 
-def _window(check: Check, happened: Mapping[str, float]) -> tuple[float, float]:
-    """Return the check's first and last instant [s], as far as what ``happened`` tells them."""
-    zero = happened[check.since] if check.since else 0.0
-    before = happened[check.until] - TICK if check.until else math.inf
-    if math.isnan(zero):
-        return math.inf, -math.inf
-    end = math.inf if check.end is None else zero + check.end
-    return zero + check.start, end if math.isnan(before) else min(end, before)
+class _OfSignal:
+    """The statistic of a check's signal."""
+
+    def __init__(self, check: Check, topics: Topics) -> None:
+        self._signal, self._statistic = find_signal(topics, check.signal), Statistic(check)
+
+    @property
+    def begun(self) -> bool:
+        """Whether there was a sample."""
+        return self._statistic.count > 0
+
+    def add(self, rows: Rows, part: slice) -> None:
+        """Go on with a part of the rows."""
+        self._statistic.add(numbers_of(rows, self._signal)[part])
+
+    def value(self) -> float | None:
+        """Return it."""
+        return self._statistic.value()
+
+
+class _OfFormula:
+    """The robustness of a check's formula."""
+
+    def __init__(self, check: Check, topics: Topics, period: float) -> None:
+        named = check.signals or {}
+        self._signals = {name: find_signal(topics, signal) for name, signal in named.items()}
+        self._monitor = Monitor(formula_of(check, topics, period))
+        self.begun = False
+
+    def add(self, rows: Rows, part: slice) -> None:
+        """Go on with a part of the rows."""
+        self.begun = True
+        self._monitor.add(
+            {
+                name: magnitude(numbers_of(rows, signal)[part])
+                for name, signal in self._signals.items()
+            }
+        )
+
+    def value(self) -> float | None:
+        """Return it; None where no sample has all around it that the formula looks at."""
+        value = self._monitor.value()
+        return value if self._monitor.count else None
+
+
+def _gathered(check: Check, topics: Topics, period: float) -> _OfSignal | _OfFormula:
+    if check.formula is None:
+        return _OfSignal(check, topics)
+    return _OfFormula(check, topics, period)

@@ -11,6 +11,7 @@ from mjspace.reporting import flight
 from mjspace.reporting.flight import CheckRow, Flight
 from mjspace.runner.checks import Verdict, margin
 from mjspace.runner.logged_verdicts import judged
+from mjspace.runner.metrics import LINE
 from mjspace.scenario.scenario import Check
 from mjspace.signals import find_signal
 from mjspace.units import Unit
@@ -42,7 +43,8 @@ def _flight(log: Log) -> Flight:
     scenario = scenario_of(log)
     found = judged(log, scenario)
     rows = [_row(log, verdict) for verdict in found.verdicts]
-    return Flight(log, scenario, rows, found.passed, found.trouble, found.events)
+    lines = [line.removeprefix(LINE) for line in found.metrics]
+    return Flight(log, scenario, rows, lines, found.passed, found.trouble, found.events)
 
 
 def _row(log: Log, verdict: Verdict) -> CheckRow:
@@ -77,7 +79,7 @@ def _row(log: Log, verdict: Verdict) -> CheckRow:
 
 def _unit(log: Log, check: Check) -> tuple[str, float]:
     """Return the unit of the check's number as it is displayed, and the factor from SI to it."""
-    if check.relative:
+    if check.relative or check.formula:
         return "", 1.0
     try:
         topic, field, _ = find_signal(log.topics, check.signal)
@@ -90,7 +92,7 @@ def _unit(log: Log, check: Check) -> tuple[str, float]:
 
 def _claim(check: Check) -> str:
     """Return what is measured: the statistic, the signal and the window."""
-    claim = f"{check.statistic} of {check.signal}"
+    claim = check.formula or f"{check.statistic} of {check.signal}"
     if check.target is not None:
         claim += f" less {check.target}" + (", relative" if check.relative else "")
     begins = f"from {check.start:g} s" if check.statistic != "final" and check.start else ""

@@ -60,12 +60,21 @@ def assembly_of(
 
 
 def _without_signals_of_the_law(scenario: Scenario) -> Scenario:
-    """Return the scenario without checks and events of signals that another law may lack."""
+    """Return the scenario without what looks at signals that another law may lack."""
 
     def is_free(*signals: str) -> bool:
         return not any(signal.startswith("law.") for signal in signals)
 
     events = [event for event in scenario.events if is_free(event.signal, *event.shows)]
     kept = {None, *(event.name for event in events)}
-    checks = [c for c in scenario.checks if is_free(c.signal) and {c.since, c.until} <= kept]
-    return scenario.model_copy(update={"events": events, "checks": checks})
+    checks = [
+        c
+        for c in scenario.checks
+        if is_free(c.signal, *(c.signals or {}).values()) and {c.since, c.until} <= kept
+    ]
+    metrics = [
+        m
+        for m in scenario.metrics
+        if is_free(m.signal or "", *m.signals) and {m.since, m.until} <= kept
+    ]
+    return scenario.model_copy(update={"events": events, "checks": checks, "metrics": metrics})

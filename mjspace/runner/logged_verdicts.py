@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from mjspace.contract import Event
 from mjspace.log.reader import Log
 from mjspace.runner.checks import NO_CRASH, Verdict
+from mjspace.runner.metrics import LINE
 from mjspace.scenario.scenario import Check, Scenario
 
 NO_VERDICT = "the log has no verdict on it"
@@ -19,10 +20,12 @@ class Judged:
     """What a log says of its flight."""
 
     verdicts: list[Verdict]
+    metrics: list[str]
+    """What each metric came to, as ``Measured.line`` wrote it."""
     trouble: str
     """Why it ended early; empty for a flight that reached its end."""
     events: list[Event]
-    """Without the lines of the verdicts."""
+    """Without the lines of the verdicts and the metrics."""
 
     @property
     def passed(self) -> bool:
@@ -50,7 +53,10 @@ def judged(log: Log, scenario: Scenario) -> Judged:
     verdicts = [verdict for verdict in found if verdict is not None]
     if len(verdicts) < len(checks):  # killed as it flew, before anything was judged
         verdicts, at = [Verdict(check, math.nan, NO_VERDICT) for check in checks], len(events)
-    return Judged(verdicts, _trouble(log, scenario, events[:at]), events[:at])
+    first = max(at - len(scenario.metrics), 0)
+    metrics = [event.message for event in events[first:at] if event.message.startswith(LINE)]
+    at -= len(metrics)
+    return Judged(verdicts, metrics, _trouble(log, scenario, events[:at]), events[:at])
 
 
 def _verdict(check: Check, line: str) -> Verdict | None:

@@ -8,6 +8,7 @@ from typing import Self
 from mjspace.log.background import Background
 from mjspace.runner.checks import Judge, Verdict
 from mjspace.runner.flight_log import FlightLog, described
+from mjspace.runner.metrics import Measured
 from mjspace.runner.output import exists
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.recording import Block, one_vehicle, shapes
@@ -37,10 +38,17 @@ class Recorder:
         """Create the log at ``path``; ``first`` is the flight's first block, for its shapes.
 
         Raises:
-            ValueError: a check of the scenario names a signal that this flight does not have.
+            ValueError: a check or a metric names a signal that this flight does not have.
         """
-        scenario = self._assembly.scenario
-        self._judge = Judge(scenario.checks, scenario.events, shapes(first))
+        assembly, scenario = self._assembly, self._assembly.scenario
+        self._judge = Judge(
+            scenario.checks,
+            scenario.events,
+            shapes(first),
+            scenario.metrics,
+            assembly.metrics,
+            scenario.rates.control,
+        )
         self._thread.call(self._create, path, member, first)
 
     def write(self, block: Block) -> None:
@@ -66,6 +74,15 @@ class Recorder:
         """
         self._thread.wait()
         return self._judge.verdicts()
+
+    def metrics(self) -> list[Measured]:
+        """Return what each metric came to in everything written so far.
+
+        Raises:
+            OSError: the log cannot be written (any more).
+        """
+        self._thread.wait()
+        return self._judge.metrics()
 
     def __enter__(self) -> Self:
         return self

@@ -41,6 +41,18 @@ def print_result(result: Result) -> None:
         for verdict in result.verdicts:
             if verdict.missing or verdict.check.because:
                 console.print(verdict.line, style=_style(verdict), markup=False, highlight=False)
+    if result.metrics:
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        table.add_column("metric")
+        table.add_column("value", justify="right")
+        for measured in result.metrics:
+            value = "-" if measured.missing else f"{measured.value:.4g}"
+            table.add_row(_shown(measured.metric.name), value)
+        console.print(table)
+        for measured in result.metrics:
+            if measured.missing:
+                line = printable(measured.line)
+                console.print(line, style="bold red", markup=False, highlight=False)
     if result.trouble:
         console.print(f"[bold red]ended early:[/] {_shown(result.trouble)}", highlight=False)
 
@@ -68,6 +80,7 @@ def result_data(result: Result) -> dict[str, Any]:
                 "name": verdict.check.name,
                 "requirement": verdict.check.requirement,
                 "signal": verdict.check.signal,
+                "formula": verdict.check.formula,
                 "statistic": verdict.check.statistic,
                 "measured": None if verdict.missing else verdict.measured,
                 "below": verdict.check.below,
@@ -79,6 +92,14 @@ def result_data(result: Result) -> dict[str, Any]:
                 "missing": verdict.missing,
             }
             for verdict in result.verdicts
+        ],
+        "metrics": [
+            {
+                "name": measured.metric.name,
+                "value": None if measured.missing else measured.value,
+                "missing": measured.missing,
+            }
+            for measured in result.metrics
         ],
     }
 

@@ -1,15 +1,21 @@
 """A flight from scenario to verdict: fly it, and log and judge it as it flies."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
 
 from mjspace.errors import FlightError, InputError, is_file_name, shortened, users_place_of
 from mjspace.interrupts import Interrupted, on_signals
-from mjspace.runner.checks import Verdict, refuse_other_dimensions, refuse_unknown
+from mjspace.runner.checks import (
+    Verdict,
+    refuse_other_dimensions,
+    refuse_unfit_formulas,
+    refuse_unknown,
+)
 from mjspace.runner.flight_log import units_of
+from mjspace.runner.metrics import Measured, refuse_unknown_signals
 from mjspace.runner.output import LOG, make_folder, refuse_existing, remove
 from mjspace.runner.recorder import Recorder
 from mjspace.runner.shown_log import Log, verdicts_table
@@ -36,6 +42,7 @@ class Result:
     """The signal that ended it, 0 for none."""
     error: FlightError | None = None
     """The error that ended it; its ``__cause__`` is what the user's own code raised."""
+    metrics: list[Measured] = field(default_factory=list)
 
     @property
     def passed(self) -> bool:
@@ -103,7 +110,7 @@ def fly_to_log(
     """Fly one member of the scenario, from ``start`` or time zero, into a new log, and judge it.
 
     Raises:
-        InputError: a check of the scenario names no signal of this flight, or has a bound of
+        InputError: a check or a metric names no signal of this flight, or has a bound of
             another dimension; ``path`` is there already, and not to be replaced by ``force``, or
             another run writes it. Nothing is written.
         FlightError: it could not even begin.
@@ -135,19 +142,23 @@ def fly_to_log(
             trouble += f": {where} did not return" if where else ""
         if trouble:
             recorder.event("ERROR", trouble)
-        verdicts = recorder.verdicts()
+        metrics, verdicts = recorder.metrics(), recorder.verdicts()
+        for measured in metrics:
+            recorder.event("WARNING" if measured.missing else "INFO", measured.line)
         for verdict in verdicts:
             recorder.event("INFO" if verdict.as_expected else "ERROR", verdict.line)
-    return Result(path, verdicts, trouble, stop.signal, ended_by)
+    return Result(path, verdicts, trouble, stop.signal, ended_by, metrics)
 
 
 def refuse_unjudgeable(assembly: Assembly, first: Block) -> None:
-    """Refuse checks that a flight with this ``first`` block cannot be judged by.
+    """Refuse checks and metrics of what a flight with this ``first`` block does not show.
 
     Raises:
-        InputError: a check names no signal of it, or has a bound of another dimension.
+        InputError: one names no signal of it, or has a bound of another dimension.
     """
-    checks, topics = assembly.scenario.checks, shapes(first)
-    refuse_unknown(checks, topics)
+    scenario, topics = assembly.scenario, shapes(first)
+    refuse_unknown(scenario.checks, topics)
+    refuse_unknown_signals(scenario.metrics, topics)
     units = units_of(assembly, first.kinds)
-    refuse_other_dimensions(checks, assembly.scenario.events, topics, units)
+    refuse_unfit_formulas(scenario.checks, topics, units, scenario.rates.control)
+    refuse_other_dimensions(scenario.checks, scenario.events, topics, units, scenario.metrics)

@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_serializer, field_validator, model_validator
 
 from mjspace.scenario.fields import AnyUnit, Finite, NonNegative, Table
@@ -22,16 +23,21 @@ REQUIRED = {
 OPTIONAL = {"normal": ("mean",), "triangular": ("mode",)}
 """What it may be given: the scenario's own value when left out."""
 _PARAMETERS = ("mean", "std", "low", "high", "mode", "values", "radius")
+ROUNDING = 1e-12
+"""Of a correlation, by which an eigenvalue may be below zero."""
 _NOT_FLOWN = ("checks", "dispersions", "events", "log", "sampling", "seed")
 _Number = Annotated[Finite, AnyUnit]
 
 
 class Dispersion(Table):
-    """One number, or vector, of the scenario that is drawn for each member of a campaign."""
+    """One number, vector or set of numbers of the scenario that each member of a campaign draws."""
 
-    key: str
+    key: str | None = None
     """Of the scenario, as ``--set`` takes it; an element of a list by its index:
     ``"initial.rate[0]"``."""
+    keys: Annotated[list[str], Field(min_length=2)] | None = None
+    """In place of ``key``: numbers that are drawn together, ``normal`` about their own values, with
+    a ``covariance``."""
     distribution: Literal[
         "normal",
         "uniform",
@@ -55,14 +61,24 @@ class Dispersion(Table):
     """Most likely value of ``triangular``; the scenario's own value when left out."""
     values: Annotated[list[_Number], Field(min_length=1)] | None = None
     """Of ``discrete``: numbers in SI or quantities, each as likely as the others."""
+    covariance: list[list[Finite]] | None = None
+    """Of ``keys``, in SI: a row for each, symmetric and positive semidefinite."""
     radius: Annotated[NonNegative, AnyUnit] | None = None
     """Length of the vector of ``on_sphere``."""
 
     @field_validator("key")
     @classmethod
-    def _a_key(cls, key: str) -> str:
-        path_of(key)
+    def _a_key(cls, key: str | None) -> str | None:
+        if key is not None:
+            path_of(key)
         return key
+
+    @field_validator("keys")
+    @classmethod
+    def _several_keys(cls, keys: list[str] | None) -> list[str] | None:
+        for key in keys or ():
+            path_of(key)
+        return keys
 
     @field_serializer("values")
     def _plain(self, values: Any) -> Any:
@@ -71,6 +87,11 @@ class Dispersion(Table):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
+        if (self.key is None) == (self.keys is None):
+            raise ValueError("key: give one, or keys with a covariance")
+        if self.keys is not None or self.covariance is not None:
+            self._fits_together()
+            return self
         required = REQUIRED[self.distribution]
         takes = (*required, *OPTIONAL.get(self.distribution, ()))
         for name in required:
@@ -95,10 +116,50 @@ class Dispersion(Table):
         given = [getattr(self, name) for name in _PARAMETERS if name != "values"]
         return [each for each in (*given, *(self.values or ())) if isinstance(each, Quantity)]
 
+    def _fits_together(self) -> None:
+        if self.keys is None or self.covariance is None or self.distribution != "normal":
+            raise ValueError('covariance: goes with keys and distribution = "normal"')
+        for name in _PARAMETERS:
+            if getattr(self, name) is not None:
+                raise ValueError(f"{name}: keys take a covariance alone")
+        count = len(self.keys)
+        sizes = [len(row) for row in self.covariance]
+        if sizes != [count] * count:
+            shape = f"{len(sizes)} rows of {', '.join(map(str, dict.fromkeys(sizes)))}"
+            raise ValueError(f"covariance: {shape} numbers, should be {count} by {count}")
+        table = np.array(self.covariance)
+        for i, j in zip(*np.nonzero(table != table.T), strict=True):
+            raise ValueError(
+                f"covariance: not symmetric: [{i}][{j}] is {table[i, j]:g}, "
+                f"[{j}][{i}] is {table[j, i]:g}"
+            )
+        scale = np.sqrt(np.abs(np.diag(table)))
+        scale[scale == 0.0] = 1.0
+        least = float(np.linalg.eigvalsh(table / np.outer(scale, scale))[0])
+        if np.any(np.diag(table) < 0.0) or least < -ROUNDING * count:
+            raise ValueError(
+                "covariance: not positive semidefinite: the least eigenvalue of the correlations "
+                f"is {least:.3g}"
+            )
+
     @property
-    def path(self) -> tuple[str, ...]:
-        """The key's parts, an index as its digits."""
-        return path_of(self.key)
+    def name(self) -> str:
+        """The key, or all keys of a set, as a person reads them."""
+        return ", ".join(self.all_keys)
+
+    @property
+    def all_keys(self) -> list[str]:
+        """The keys of what it draws."""
+        return [self.key] if self.key is not None else list(self.keys or ())
+
+    @property
+    def paths(self) -> list[tuple[str, ...]]:
+        """Each key's parts, an index as its digits."""
+        return [path_of(key) for key in self.all_keys]
+
+    def by_key(self, value: Any) -> dict[str, Any]:
+        """Return what was drawn, by key."""
+        return dict(zip(self.all_keys, [value] if self.keys is None else value, strict=True))
 
 
 def path_of(key: str) -> tuple[str, ...]:
@@ -134,10 +195,15 @@ def refuse_overlaps(dispersions: Sequence[Dispersion]) -> None:
     Raises:
         ValueError: with both keys.
     """
-    for number, one in enumerate(dispersions):
-        for other in dispersions[:number]:
-            shorter = min(len(one.path), len(other.path))
-            if one.path[:shorter] == other.path[:shorter]:
-                raise ValueError(
-                    f"dispersions.{number}.key: {one.key!r} and {other.key!r} set the same number"
-                )
+    earlier: list[str] = []
+    for number, dispersion in enumerate(dispersions):
+        for key in dispersion.all_keys:
+            for other in earlier:
+                one, two = path_of(key), path_of(other)
+                shorter = min(len(one), len(two))
+                if one[:shorter] == two[:shorter]:
+                    place = "key" if dispersion.keys is None else "keys"
+                    raise ValueError(
+                        f"dispersions.{number}.{place}: {key!r} and {other!r} set the same number"
+                    )
+            earlier.append(key)

@@ -55,15 +55,17 @@ def validated(table: dict[str, Any], where: str, origins: Mapping[str, str] = {}
     """
     cut = {"cut_short": "duration" in origins}
     found = validate(table, where, origins, context=cut)
-    late = [check for check in found.checks if check.begins_too_late(found.duration)]
-    if late:
-        names = ", ".join(repr(check.name) for check in late)
-        warnings.warn(
-            f"checks that begin after the flight's end, {found.duration:g} s, left out: {names}",
-            stacklevel=3,
-        )
-        kept = [check for check in found.checks if check not in late]
-        found = found.model_copy(update={"checks": kept})
+    for what, measured in (("checks", found.checks), ("metrics", found.metrics)):
+        late = [one for one in measured if one.begins_too_late(found.duration)]
+        if late:
+            names = ", ".join(repr(one.name) for one in late)
+            warnings.warn(
+                f"{what} that begin after the flight's end, {found.duration:g} s, left out: "
+                f"{names}",
+                stacklevel=3,
+            )
+            kept = [one for one in measured if one not in late]
+            found = found.model_copy(update={what: kept})
     return found
 
 

@@ -34,6 +34,11 @@ class Region(Table):
 
     def admits(self, value: Array | float) -> NDArray[np.bool_]:
         """Return whether each value is inside; what is no number never is."""
-        below = True if self.below is None else np.less(value, self.below)
-        above = True if self.above is None else np.greater(value, self.above)
-        return np.logical_and(below, above)
+        return admitted(value, self.below, self.above)
+
+
+def admitted(value: Array | float, below: float | None, above: float | None) -> NDArray[np.bool_]:
+    """Return whether each value is between the bounds; what is no number never is."""
+    less = True if below is None else np.less(value, below)
+    greater = True if above is None else np.greater(value, above)
+    return np.logical_and(less, greater)

@@ -1,31 +1,28 @@
 """A scenario, whole: what flies, where, under which law, how long, and what it must show."""
 
-import math
+import operator
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
     ValidationInfo,
-    ValidatorFunctionWrapHandler,
-    field_serializer,
     field_validator,
     model_validator,
 )
 
-from mjspace.contract import TICK
-from mjspace.ranges import numbers
 from mjspace.scenario.declared import DeclaredIn
 from mjspace.scenario.dispersions import Dispersion, refuse_overlaps
 from mjspace.scenario.environment import Environment
-from mjspace.scenario.fields import Count, FileName, KindName, Positive, Si, Switch, Table, Time
+from mjspace.scenario.fields import Count, FileName, KindName, Positive, Si, Table
 from mjspace.scenario.log_rates import LogRates
+from mjspace.scenario.measurement import Measurement
+from mjspace.scenario.metrics import Metric
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
 from mjspace.scenario.sensors import Sensors, check_sensors
-from mjspace.units import Quantity, to_si, whole_number
+from mjspace.units import whole_number
 
 _MOST_STEPS = 100_000  # in a control period: seconds of wall time
 
@@ -61,25 +58,18 @@ class EventTable(SignalRegion):
     """Other signals whose values the line gives as well."""
 
 
-class Check(SignalRegion):
+class Check(Measurement, SignalRegion):
     """One thing that the flight must show, judged on every control period."""
 
     statistic: Literal["max", "min", "peak", "mean", "rms", "final", "drift"] = "max"
     """Over the window: of the value, or of the norm of a vector; ``peak`` is the largest magnitude,
     ``drift`` the largest change from the window's first value. It is what has to be in bounds."""
-    start: Time = 0.0
-    """The window's first instant."""
-    end: Time | None = None
-    """The window's last instant; the flight's when left out."""
-    since: str | None = None
-    """Name of an event: the window's instants are counted from when it first happened."""
-    until: str | None = None
-    """Name of an event: the window ends before it first happened."""
-    target: float | list[float] | None = None
-    """Taken from the signal first, so that the statistic is of an error; numbers in SI or
-    quantities."""
-    relative: Switch = False
-    """The error is divided by the norm of ``target``."""
+    formula: str | None = None
+    """In place of a signal and its bounds, of temporal logic:
+    ``"always(dark -> eventually[0:60 s](error < 1 deg))"``. What is measured is its robustness,
+    over the sizes of the bounds in it, which has to be above 0."""
+    signals: dict[str, str] | None = None
+    """Of the formula: the signal of each name in it; one that is named alone is a flag, 0 or 1."""
     expected: Literal["PASS", "FAIL"] = "PASS"
     """How the check comes out when all is well: FAIL of what the flight shows not to hold. The
     scenario passes if it reaches its end and every check comes out as expected; a check without a
@@ -92,6 +82,21 @@ class Check(SignalRegion):
     fails_with: list[str] = []
     """``"key=value"``, or a list of them that go together, as ``--set`` takes them: a change of the
     scenario with which the check comes out the other way, because what it claims is gone."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_a_formula(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or table.get("formula") is None:
+            if isinstance(table, dict) and table.get("signals") is not None:
+                raise ValueError("signals: go with a formula")
+            return table
+        if not table.get("signals"):
+            raise ValueError("signals: missing, what each name in the formula stands for")
+        fixed = {"signal": "", "above": 0.0, "statistic": "min", "relative": False}
+        for key in (*fixed, "below", "target"):
+            if table.get(key, fixed.get(key)) != fixed.get(key):
+                raise ValueError(f"{key}: goes with a signal, not with a formula")
+        return table | fixed
 
     @field_validator("fails_with", mode="before")
     @classmethod
@@ -116,48 +121,6 @@ class Check(SignalRegion):
         if self.expected == "PASS" and self.because:
             raise ValueError('because goes with expected = "FAIL"')
         return self
-
-    @field_validator("target", mode="wrap")
-    @classmethod
-    def _numbers(cls, value: Any, _: ValidatorFunctionWrapHandler) -> Any:
-        if value is None:
-            return None
-        several = isinstance(value, list | tuple)
-        items = to_si(value if several else [value], None)
-        found = numbers(items)
-        if found.ndim != 1 or not len(found) or not np.isfinite(found).all():
-            raise ValueError(f"got {value!r}, should be a finite number or a list of them")
-        kept = [each if isinstance(each, Quantity) else float(each) for each in items]
-        return kept if several else kept[0]
-
-    @field_serializer("target")
-    def _in_si(self, target: Any) -> Any:
-        # Pydantic warns of quantities in a list.
-        return [float(each) for each in target] if isinstance(target, list) else target
-
-    @model_validator(mode="after")
-    def _of_an_error(self) -> Self:
-        if self.relative and self.target is None:
-            raise ValueError("relative: needs a target")
-        if self.relative and not np.any(self.target):
-            raise ValueError("relative: the target is zero, by which no error can be divided")
-        return self
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.end is not None and self.end < self.start:
-            raise ValueError(f"start: {self.start:g} s is after end, {self.end:g} s")
-        return self
-
-    def begins_too_late(self, duration: float) -> bool:
-        """Return whether a flight of ``duration`` [s] ends before the window begins."""
-        return self.start > duration + TICK
-
-    def is_between_samples(self, period: float) -> bool:
-        """Return whether the window lies between two instants of a log of that ``period`` [s]."""
-        if self.end is None or self.since is not None:
-            return False
-        return math.floor((self.end + TICK) / period) * period < self.start - TICK
 
 
 class Scenario(Table):
@@ -185,24 +148,33 @@ class Scenario(Table):
     law: Component
     faults: list[Annotated[Any, DeclaredIn("mjspace.actuators.faults:Fault", optional=False)]] = []
     checks: list[Check] = []
+    # Left out where there are none: such a scenario is written as before there were metrics.
+    metrics: Annotated[list[Metric], Field(exclude_if=operator.not_)] = []
     events: list[EventTable] = []
     log: LogRates = LogRates()
     dispersions: list[Dispersion] = []
     """What differs from member to member of ``mjspace campaign``; every other command flies the
     scenario as it stands."""
-    sampling: Literal["random", "latin_hypercube", "sobol"] = "random"
+    sampling: Literal["random", "latin_hypercube", "sobol", "saltelli"] = "random"
     """How a campaign covers what its dispersions span. With ``latin_hypercube`` the draws depend on
-    the number of members too."""
+    the number of members too; ``saltelli`` is for Sobol indices."""
 
     @property
     def kinds(self) -> dict[str, str]:
-        """What it names of code, by role: law, reference, and estimator and disturbance if any."""
+        """What it names of code, by role: law, reference, and estimator, disturbance, metrics."""
         found = {"law": self.law.kind, "reference": self.reference.kind}
         if self.estimator is not None:
             found["estimator"] = self.estimator.kind
         if self.environment.python is not None:
             found["disturbance"] = self.environment.python
-        return found
+        functions = [metric.function for metric in self.metrics if metric.function]
+        return found | {f"metrics.{n}": function for n, function in enumerate(functions)}
+
+    @property
+    def _measured(self) -> dict[str, Measurement]:
+        """Its checks and metrics, by their places."""
+        found: dict[str, Measurement] = {f"checks.{n}": c for n, c in enumerate(self.checks)}
+        return found | {f"metrics.{n}": metric for n, metric in enumerate(self.metrics)}
 
     @model_validator(mode="before")
     @classmethod
@@ -217,11 +189,19 @@ class Scenario(Table):
     @model_validator(mode="after")
     def _checks_of_events(self) -> "Scenario":
         names = [event.name for event in self.events]
-        for number, check in enumerate(self.checks):
+        for place, measured in self._measured.items():
             for key in ("since", "until"):
-                name = getattr(check, key)
+                name = getattr(measured, key)
                 if name is not None and name not in names:
-                    raise ValueError(f"checks.{number}.{key}: no event {name!r} in events: {names}")
+                    raise ValueError(f"{place}.{key}: no event {name!r} in events: {names}")
+        return self
+
+    @model_validator(mode="after")
+    def _each_metric_once(self) -> "Scenario":
+        names = [metric.name for metric in self.metrics]
+        for number, name in enumerate(names):
+            if name in names[:number]:
+                raise ValueError(f"metrics.{number}.name: {name!r} is there already")
         return self
 
     @model_validator(mode="after")
@@ -267,15 +247,15 @@ class Scenario(Table):
         if _is_flown(info):
             return self
         period = self.rates.control
-        for number, check in enumerate(self.checks):
-            if check.begins_too_late(self.duration) and not _is_cut_short(info):
+        for place, measured in self._measured.items():
+            if measured.begins_too_late(self.duration) and not _is_cut_short(info):
                 raise ValueError(
-                    f"checks.{number}.start: {check.start:g} s is after the flight's end, duration "
+                    f"{place}.start: {measured.start:g} s is after the flight's end, duration "
                     f"{self.duration:g} s"
                 )
-            if check.is_between_samples(period):
+            if measured.is_between_samples(period):
                 raise ValueError(
-                    f"checks.{number}: nothing is logged from {check.start:g} to {check.end:g} s, "
+                    f"{place}: nothing is logged from {measured.start:g} to {measured.end:g} s, "
                     f"but every {period:g} s (rates.control)"
                 )
         return self

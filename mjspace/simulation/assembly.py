@@ -24,11 +24,11 @@ from mjspace.scenario.construct import construct
 from mjspace.scenario.on_reference import on_reference
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.trust import Trust, is_address, is_library
-from mjspace.scenario.user_files import files_of, source_of
 from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
 from mjspace.simulation.estimated_law import EstimatedLaw, refuse_inner_loop
 from mjspace.simulation.known_beforehand import Known, known_of, seen_of
+from mjspace.simulation.sources import in_log, metric_functions
 from mjspace.simulation.unbatched_law import UnbatchedLaw
 from mjspace.vehicle import deployments, ground, ground_contact, other_spacecraft, own_model
 from mjspace.vehicle.vehicle import Vehicle, build, driven_by, initial_state
@@ -68,8 +68,10 @@ class Assembly:
     disturbance: Callable[..., tuple[Any, Any]] | None
     """The user's own Python disturbance."""
     sources: dict[str, bytes]
-    """The files that define law, estimator, reference and disturbance, as ``law.py``, and with what
-    it needs of its folder in ``law/``: by their names in a log."""
+    """The files that define law, estimator, reference, disturbance and metrics, as ``law.py``, and
+    with what it needs of its folder in ``law/``: by their names in a log."""
+    metrics: Mapping[str, Callable[..., Any]]
+    """The functions of the user's metrics, by the metrics' names."""
 
     def sensors(self, members: Sequence[int]) -> SensorSuite:
         """Return the sensors of these members of the campaign, each with its own random streams."""
@@ -207,8 +209,9 @@ def assemble(
     if kind is not None:
         disturbance = _part("environment.python", own.load, kind)
         flown["environment"] = scenario.environment.model_copy(
-            update={"python": _in_log("disturbance", kind, disturbance, sources)}
+            update={"python": in_log("disturbance", kind, disturbance, sources)}
         )
+    metrics, flown["metrics"] = metric_functions(scenario.metrics, own, sources)
     qpos, qvel = _part("initial", initial_state, vehicle, scenario.initial)
     deployments.stow(vehicle.model, qpos, scenario.plant.parts)
     _part("plant", other_spacecraft.set_states, vehicle.model, scenario.plant, qpos, qvel)
@@ -233,6 +236,7 @@ def assemble(
         inner=inner,
         disturbance=disturbance,
         sources=sources,
+        metrics=metrics,
     )
     _part("faults", assembly.faults, [0])
     _part("sensors", assembly.sensors, [0])
@@ -288,7 +292,7 @@ def _component(
     with input_error_at(role):
         kind = trust.load_class(component.kind, METHODS[role])
         built, flown = construct(component, kind, facts, trust)
-    return built, flown.model_copy(update={"kind": _in_log(role, component.kind, kind, sources)})
+    return built, flown.model_copy(update={"kind": in_log(role, component.kind, kind, sources)})
 
 
 def _has_inner_loop(law: Any) -> bool:
@@ -300,23 +304,6 @@ def _has_inner_loop(law: Any) -> bool:
             "a leading vehicle axis, and set its attribute batched = True"
         )
     return has
-
-
-def _in_log(role: str, kind: str, found: Any, sources: dict[str, bytes]) -> str:
-    """Add the files that define what was ``found``; return its ``kind`` as the log knows it.
-
-    A file of one's own is in the log as <role>.py or, with what it needs of its folder, in <role>/.
-    """
-    text, beside = source_of(found).encode(), files_of(found)
-    sources[f"{role}.py"] = text
-    place, _, name = kind.partition(":")
-    if not place.endswith(".py"):
-        return kind
-    if not beside:
-        return f"{role}.py:{name}"
-    file = Path(place).name
-    sources |= {f"{role}/{other}": content for other, content in {file: text, **beside}.items()}
-    return f"{role}/{file}:{name}"
 
 
 def _actuators(vehicle: Vehicle, scenario: Scenario, *, inner: bool) -> ActuatorSet:

@@ -212,11 +212,12 @@ def test_what_did_not_arrive_is_named(tmp_path: Path) -> None:
     flown = assembly.scenario.model_dump(mode="python")
     for dispersion, value in zip(everyone.dispersions, drawn, strict=True):
         with pytest.raises(FlightError) as raised:
-            require_arrival(assembly, flown, dispersion, value + 1e-9, "member 1")
+            require_arrival(assembly, flown, dispersion, dispersion.name, value + 1e-9, "member 1")
         assert f"dispersion {dispersion.key} did not arrive" in str(raised.value)
     moved = replace(assembly, qvel=np.zeros_like(assembly.qvel))
+    first = everyone.dispersions[0]
     with pytest.raises(FlightError, match=r"initial.rate\[0\] did not arrive"):
-        require_arrival(moved, flown, everyone.dispersions[0], drawn[0], "member 1")
+        require_arrival(moved, flown, first, first.name, drawn[0], "member 1")
 
 
 @pytest.mark.parametrize(
@@ -245,7 +246,7 @@ def test_bad_input_is_one_line(
     out = tmp_path / "out"
     store = Store(out, population(what))
     with store.opened():
-        store.write([Flown(0, [0.3], [], "it was stopped", 1.0)])
+        store.write([Flown(0, [0.3], [], [], "it was stopped", 1.0)])
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     usual = ["campaign", what.scenario, "--out", str(out)]
     for option, value in (("--n", "3"), ("--seed", "1")):
@@ -319,3 +320,26 @@ def test_processes_make_the_same_table_and_a_known_rate_is_inside_its_interval(
     two = fly(what, tmp_path / "two", processes=2, block=7, keep="none")
     one = Store(tmp_path / "0", population(what)).read().drop_columns([WALL_TIME])
     assert bytes_of(two) == bytes_of(one)
+
+
+TOGETHER = """
+[[dispersions]]
+keys = ["initial.rate[1]", "plant.gyrostat_inertia[1][1]"]
+distribution = "normal"
+covariance = [[1e-4, 9e-4], [9e-4, 1e-2]]
+"""
+
+
+@pytest.mark.usefixtures("here")
+def test_a_correlated_set_flies_and_is_a_column_each(tmp_path: Path) -> None:
+    path = scenario(tmp_path, SCENARIO + TOGETHER)
+    table = fly(Campaign(path, (), 8, 1), tmp_path / "out")
+    one, other = (table[key].to_numpy() for key in ("initial.rate[1]", INERTIA.split('"')[1]))
+    assert np.corrcoef(one, other)[0, 1] > 0.6
+    log = campaigns.fly_one(
+        Campaign(path, (), 8, 1), tmp_path / "out", 3, force=False, progress=lambda time: None
+    ).log
+    assert log.read("/truth")["rate"][0, 1] == one[3]
+    unknown = scenario(tmp_path, SCENARIO + TOGETHER.replace("initial.rate[1]", "law.gain"))
+    with pytest.raises(InputError, match=r"dispersions.1.keys: law.gain: no 'gain' in law"):
+        population(Campaign(unknown, (), 8))

@@ -8,7 +8,7 @@ from scipy import stats
 
 from mjspace.campaign import draws
 from mjspace.errors import InputError
-from mjspace.scenario.dispersions import Dispersion
+from mjspace.scenario.dispersions import Dispersion, refuse_overlaps
 from mjspace.scenario.loading import load
 
 MANY = 1024
@@ -70,6 +70,68 @@ def test_directions_are_evenly_distributed_over_the_sphere() -> None:
     assert np.linalg.norm(found, axis=1) == pytest.approx(np.radians(2.0), abs=1e-15)
     for component in found.T / np.radians(2.0):
         assert stats.kstest(component, stats.uniform(-1.0, 2.0).cdf).statistic < CLOSE
+
+
+KEYS = ["initial.rate[0]", "initial.rate[1]", "law.rate_gain"]
+COVARIANCE = np.array([[1.0, -0.6, 20.0], [-0.6, 4.0, 0.0], [20.0, 0.0, 500.0]])
+
+
+def together(covariance: Any, **parameters: Any) -> Dispersion:
+    table: dict[str, Any] = {"keys": KEYS, "distribution": "normal", "covariance": covariance}
+    return Dispersion(**(table | parameters))
+
+
+def test_a_set_has_the_covariance_that_is_given() -> None:
+    one, many = together(COVARIANCE.tolist()), 4096
+    rows = draws.uniforms("random", 11, range(many), many, [one])
+    assert rows.shape == (many, 3)
+    found = np.array([draws.values([one], [[1.0, 2.0, 30.0]], row)[0] for row in rows])
+    # Of n normal numbers: the mean's variance is c_ii / n, the sample covariance's
+    # (c_ii c_jj + c_ij^2) / n; four standard errors, and the seed is fixed.
+    error = 4.0 * np.sqrt(np.diag(COVARIANCE) / many)
+    assert (np.abs(found.mean(axis=0) - [1.0, 2.0, 30.0]) < error).all()
+    variances = np.diag(COVARIANCE)
+    error = 4.0 * np.sqrt((np.outer(variances, variances) + COVARIANCE**2) / many)
+    assert (np.abs(np.cov(found.T) - COVARIANCE) < error).all()
+
+
+def test_a_covariance_may_be_singular() -> None:
+    one = together([[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
+    rows = draws.uniforms("sobol", 1, range(64), 64, [one])
+    found = np.array([draws.value(one, [0.0, 0.0, 5.0], row) for row in rows])
+    assert found[:, 1] == pytest.approx(2.0 * found[:, 0], abs=1e-7)
+    assert found[:, 2] == pytest.approx(5.0, abs=1e-7)
+    assert np.ptp(found[:, 0]) > 2.0
+
+
+@pytest.mark.parametrize(
+    ("covariance", "changes", "line"),
+    [
+        ([[1.0, 0.5], [0.5, 1.0]], {}, "2 rows of 2 numbers, should be 3 by 3"),
+        ([[1.0, 0.5, 0.0]] * 2 + [[0.0]], {}, "3 rows of 3, 1 numbers, should be 3 by 3"),
+        ([[1, 0.5, 0], [0.4, 1, 0], [0, 0, 1]], {}, r"\[0\]\[1\] is 0.5, \[1\]\[0\] is 0.4"),
+        ([[1, 2, 0], [2, 1, 0], [0, 0, 1]], {}, "not positive semidefinite: .* is -1"),
+        ([[1, 0, 0], [0, -1, 0], [0, 0, 1]], {}, "not positive semidefinite"),
+        (None, {}, 'covariance: goes with keys and distribution = "normal"'),
+        (np.eye(3).tolist(), {"keys": None}, "key: give one, or keys"),
+        (np.eye(3).tolist(), {"key": "law.rate_gain"}, "key: give one, or keys"),
+        (np.eye(3).tolist(), {"distribution": "uniform"}, 'distribution = "normal"'),
+        (np.eye(3).tolist(), {"std": 1.0}, "std: keys take a covariance alone"),
+        (np.eye(3).tolist(), {"keys": ["duration", "seed", "law.k"]}, "'seed' is no part"),
+    ],
+)
+def test_a_set_that_is_none_is_refused(covariance: Any, changes: Any, line: str) -> None:
+    with pytest.raises(ValueError, match=line):
+        together(covariance, **changes)
+
+
+def test_two_dispersions_of_one_number_are_refused_in_a_set_too() -> None:
+    one, two = together(np.eye(3).tolist()), dispersion("normal", std=1.0)
+    with pytest.raises(ValueError, match=r"dispersions.1.key: 'initial.rate\[0\]' and"):
+        refuse_overlaps([one, two])
+    twice = together(np.eye(3).tolist(), keys=[*KEYS[:2], KEYS[0]])
+    with pytest.raises(ValueError, match=r"dispersions.0.keys: .*same number"):
+        refuse_overlaps([twice])
 
 
 @pytest.mark.parametrize("sampling", ["random", "latin_hypercube", "sobol"])

@@ -11,7 +11,7 @@ from command_lines import command_line
 from one_axis import ONE_AXIS, written
 
 from mjspace.campaign import robustness
-from mjspace.campaign.falsify import falsify, nominal_draws
+from mjspace.campaign.falsify import Falsified, falsify, nominal_draws
 from mjspace.campaign.members import Campaign, population
 from mjspace.campaign.search import minimize
 from mjspace.errors import InputError
@@ -51,9 +51,13 @@ UNSTABLE = 2.0 / 0.5
 """Gain over inertia from which on it is: w[k + 1] = (1 - T gain / inertia) w[k]."""
 
 
+def searched(what: Campaign, **options: Any) -> Falsified:
+    return falsify(population(what), **options)
+
+
 @pytest.mark.usefixtures("here")
 def test_the_weakness_is_found_and_made_minimal(tmp_path: Path) -> None:
-    found = falsify(Campaign(written(tmp_path, SCENARIO), (), 200, 1))
+    found = searched(Campaign(written(tmp_path, SCENARIO), (), 200, 1))
     assert found.worst.margin < 0.0
     assert 0 < found.before <= found.flights <= 200
     gain, inertia, rate = found.worst.draws
@@ -66,9 +70,28 @@ def test_the_weakness_is_found_and_made_minimal(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("here")
+def test_a_formula_that_is_violated_in_a_corner_is_found(tmp_path: Path) -> None:
+    pytest.importorskip("rtamt")
+    # A second after 0.01 rad/s there is (1 - T gain / inertia)^2 of it: over 0.004 with gains
+    # below 0.37 inertia / T, and beyond 1.63 of it, which this range does not reach.
+    formula = """formula = "always(begins > 0.3 deg/s -> eventually[1:1 s](rate < 0.004 rad/s))"
+signals = { begins = "truth.rate", rate = "truth.rate" }
+"""
+    text = SCENARIO.replace('signal = "truth.rate"\nstart = "5 s"\nbelow = 0.01\n', formula)
+    text = text.replace("low = 2\nhigh = 30", "low = 5\nhigh = 25")
+    what = Campaign(written(tmp_path, text), ("law.rate_gain=15",), 100, 1)
+    found = searched(what)
+    assert found.worst.margin < 0.0
+    gain, inertia, _ = found.worst.draws
+    left = (1.0 - 0.5 * gain / inertia) ** 2
+    assert found.worst.margin == pytest.approx(1.0 - 0.01 * left / 0.004, abs=0.05)
+    assert found.worst.why.startswith("FAIL rate: -")
+
+
+@pytest.mark.usefixtures("here")
 def test_where_nothing_fails_the_least_margin_is_told(tmp_path: Path) -> None:
     safe = SCENARIO.replace("high = 30", "high = 20")
-    found = falsify(Campaign(written(tmp_path, safe), (), 30, 1))
+    found = searched(Campaign(written(tmp_path, safe), (), 30, 1))
     assert found.minimal is None
     assert (found.before, found.flights) == (0, 31)  # the first is the scenario as it is
     assert 0.0 < found.worst.margin < 1.0
@@ -78,21 +101,21 @@ def test_where_nothing_fails_the_least_margin_is_told(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("here")
 def test_the_same_seed_finds_the_same_and_a_search_goes_on_if_asked(tmp_path: Path) -> None:
     path = written(tmp_path, SCENARIO)
-    once, again = (falsify(Campaign(path, (), 20, 7), processes=1) for _ in range(2))
+    once, again = (searched(Campaign(path, (), 20, 7), processes=1) for _ in range(2))
     assert once == again
-    longer = falsify(Campaign(path, (), 40, 7), go_on=True, processes=1)
+    longer = searched(Campaign(path, (), 40, 7), go_on=True, processes=1)
     assert longer.before == once.before
     assert longer.worst.margin < once.worst.margin
-    assert falsify(Campaign(path, (), 20, 8), processes=1).worst.draws != once.worst.draws
+    assert searched(Campaign(path, (), 20, 8), processes=1).worst.draws != once.worst.draws
 
 
 def test_a_scenario_that_fails_as_it_is_or_has_no_dispersions_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="fails as it is: FAIL rate"):
-        falsify(Campaign(written(tmp_path, SCENARIO), ("law.rate_gain=41",), 10, 1), processes=1)
+        searched(Campaign(written(tmp_path, SCENARIO), ("law.rate_gain=41",), 10, 1), processes=1)
     with pytest.raises(InputError, match="no checks"):
-        falsify(Campaign(written(tmp_path, SCENARIO), ("checks=[]",), 10, 1))
+        searched(Campaign(written(tmp_path, SCENARIO), ("checks=[]",), 10, 1))
     with pytest.raises(InputError, match="there is nothing to search"):
-        falsify(Campaign("wheel-failure", (), 10, 1))
+        searched(Campaign("wheel-failure", (), 10, 1))
 
 
 def test_a_scenario_without_a_value_of_its_own_starts_from_the_median(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from one_axis import ONE_AXIS, written
 
 from mjspace.campaign.falsify import falsify
 from mjspace.campaign.margins import Margin, Question, find
-from mjspace.campaign.members import Campaign
+from mjspace.campaign.members import Campaign, population
 from mjspace.campaign.tune import Goal, Varied, tune
 from mjspace.interrupts import Interrupted
 from mjspace.runner import workers
@@ -56,7 +56,7 @@ def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_search_that_is_interrupted_ends_as_one(tmp_path: Path) -> None:
     what = Campaign(written(tmp_path, SCENARIO), (), 20, 1)
     with pytest.raises(ENDED):
-        falsify(what)
+        falsify(population(what))
     varied, goal = [Varied("initial.rate[0]", 0.001, 0.1)], Goal("rms(truth.rate)", ())
     with pytest.raises(ENDED):
         tune(what, varied, goal, draws=1, fresh=1)

@@ -42,13 +42,13 @@ def test_members_that_both_have_are_counted_in_pairs(tmp_path: Path) -> None:
     assert (found.both, found.first, found.second, found.neither) == (1, 0, 2, 0)
     assert found.difference == pytest.approx(2.0 / 3.0)
     (check,) = found.checks
-    assert (check.name, check.members, check.better) == ("error", 2, 1.0)
+    assert (check.name, check.members, check.larger) == ("error", 2, 1.0)
     assert check.difference == pytest.approx(np.median([0.5, 2.0]))
     assert check.interval == (0.5, 2.0)
 
 
 def test_the_difference_of_rates_is_tested_exactly_and_has_an_interval() -> None:
-    found = Pairs(both=80, first=2, second=13, neither=5, checks=[])
+    found = Pairs(both=80, first=2, second=13, neither=5, checks=[], metrics=[])
     sided = sum(stats.binom.pmf(k, 15, 0.5) for k in range(3))
     assert found.probability == pytest.approx(2.0 * sided)
     # Agresti and Min: (c - b) / (n + 2), with half a member more in each of the four counts.
@@ -56,7 +56,7 @@ def test_the_difference_of_rates_is_tested_exactly_and_has_an_interval() -> None
     right = 11.0 / 102.0 + stats.norm.ppf(0.975) * spread * np.array([-1.0, 1.0])
     assert found.interval == pytest.approx(tuple(right), rel=1e-12)
     assert found.interval[0] > 0.0
-    assert Pairs(10, 0, 0, 0, []).probability == 1.0
+    assert Pairs(10, 0, 0, 0, [], []).probability == 1.0
 
 
 def test_the_interval_of_the_median_covers_it_as_often_as_it_says() -> None:
