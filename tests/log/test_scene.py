@@ -217,7 +217,7 @@ LANDER = {
 def paths_of(topics: Any) -> list[str]:
     found = layout("hub", topics).decode()
     whole = json.loads(found)
-    panels = re.findall(r"(?:3D|Plot)!\w+", json.dumps(whole["layout"]))
+    panels = re.findall(r"(?:3D|RosOut|Plot)!\w+", json.dumps(whole["layout"]))
     assert sorted(panels) == sorted(whole["configById"])
     return re.findall(r'"value": "([^"]+)"', found)
 
