@@ -30,19 +30,30 @@ SHOWN = 20
 def convert(
     log: LogFile,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="x.csv, x.parquet, x.npz, x.mat or x.rrd.")
+        Path,
+        typer.Option("-o", "--output", help="x.csv, .parquet, .npz, .mat, .rrd or .mcap."),
     ],
     signals: Signals = [],  # noqa: B006
     topics: Topics = [],  # noqa: B006
     rate: Annotated[
         float | None, typer.Option(help="Rows a second; all of the log's when left out.")
     ] = None,
+    video: Annotated[
+        str | None,
+        typer.Option(metavar="CAMERA", help="In x.mcap, also the pictures of this camera: chase."),
+    ] = None,
 ) -> None:
-    """Write a log for other tools: a table, arrays, or a recording for Rerun (x.rrd)."""
+    """Write a log for other tools: a table, arrays, or for viewers.
+
+    x.rrd is a recording for Rerun; x.mcap a copy of the log with arrows, for Foxglove, Lichtblick
+    and Rerun.
+    """
     from mjspace.conversion.convert import convert as to_file
 
     with progress_bar(open_log(log).end, "converting") as progress, input_error_at("convert"):
-        to_file(log, output, signals=signals, topics=topics, rate=rate, progress=progress)
+        to_file(
+            log, output, signals=signals, topics=topics, rate=rate, camera=video, progress=progress
+        )
     print(output)
 
 
@@ -60,7 +71,8 @@ def layout(
     if output.suffix != ".json":
         raise InputError(f"layout: output '{output}': end it in .json")
     with input_error_at("layout"), whole_or_none(output) as file:
-        file.write(foxglove_layout.layout(bus_of(opened), opened.topics))
+        video = next(opened.records("/video"), None) is not None
+        file.write(foxglove_layout.layout(bus_of(opened), opened.topics, video=video))
     print(output)
 
 

@@ -9,13 +9,16 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from mjspace.conversion import rerun
+from mjspace.conversion import rerun, viewed
 from mjspace.errors import whole_or_none
 from mjspace.log.arrow import pyarrow_for
 from mjspace.log.columns import Signal, blocks, select, stride, table
 from mjspace.log.reader import Log
 
 Progress = Callable[[float], None]
+
+COPY = ".mcap"
+"""The ending of a log."""
 
 
 def convert(
@@ -25,15 +28,19 @@ def convert(
     signals: Sequence[str] = (),
     topics: Sequence[str] = (),
     rate: float | None = None,
+    camera: str | None = None,
     progress: Progress = lambda time: None,
 ) -> None:
-    """Write a log's signals as ``output``: .csv, .parquet, .npz, .mat or .rrd.
+    """Write a log's signals as ``output``: .csv, .parquet, .npz, .mat, .rrd or .mcap.
 
     A table (.csv, .parquet) has a row for each instant, a column ``time`` [s] and one for each
     number, ``truth.rate[0]``, in SI units; where a topic has no row, the cell is empty. It is
     written chunk by chunk. The others hold an array for each signal and the times of each topic:
     ``truth.time`` and ``truth.rate``, in MATLAB the fields of a struct ``truth``. A recording of
     Rerun (.rrd) also has the shapes and frames of the bodies, the events and a layout.
+
+    ``.mcap`` is a copy of the log with arrows for viewers on /arrows, and with the pictures of
+    ``camera`` on /video where one is named.
 
     ``signals`` are named as in a check, ``topics`` as in the log; all but /state where neither is
     given. ``rate`` [Hz] leaves out rows: the control rate over a whole number.
@@ -44,8 +51,20 @@ def convert(
         OSError: a file cannot be read or written.
     """
     log, output = Log.of(log), Path(output)
+    if output.suffix == COPY:
+        if signals or topics or rate is not None:
+            raise ValueError(
+                f"output {str(output)!r}: has all of the log: leave signals, topics and rate out"
+            )
+        if output.resolve() == log.path.resolve():
+            raise ValueError(f"output {str(output)!r}: should not be the log itself")
+        with whole_or_none(output) as file:
+            viewed.write(log, file, camera, progress)
+        return
+    if camera is not None:
+        raise ValueError(f"output {str(output)!r}: a camera's video is for {COPY} alone")
     if output.suffix not in WRITERS:
-        endings = ", ".join(WRITERS)
+        endings = ", ".join([*WRITERS, COPY])
         raise ValueError(f"output {str(output)!r}: end it in one of {endings}")
     chosen, every = select(log, signals, topics), stride(log, rate)
     if not chosen:

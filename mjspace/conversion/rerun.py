@@ -9,6 +9,7 @@ import numpy as np
 
 from mjspace.attitude import rotate
 from mjspace.contract import Array
+from mjspace.conversion.arrows import Arrows, arrows_of
 from mjspace.conversion.rerun_layout import FOLLOW, WORLD, blueprint
 from mjspace.conversion.shown import Frames, bus_of, extent, frames_of, shapes_of
 from mjspace.errors import InputError
@@ -20,6 +21,7 @@ Rows = dict[str, dict[str, Array]]
 """Of each topic ``time`` [s], (n,), and the fields, (n, ...)."""
 
 _TIMELINE = "time"
+_THICKNESS = 0.012  # radius of an arrow, over the vehicle's reach
 _BATCH = 20_000  # rows of a curve's part
 _LEVELS = {"WARNING": "WARN"}  # Rerun's names of levels, where they are others
 
@@ -81,9 +83,11 @@ def _add_all(
 ) -> None:
     recording.send_recording_name(log.metadata.get("scenario", log.path.stem))
     shapes, frames, bus = shapes_of(log), frames_of(log), bus_of(log)
+    reach = extent(shapes, frames, bus)
     fields = {(signal.topic, signal.field) for signal in chosen}
-    recording.send_blueprint(blueprint(log, fields, extent(shapes, frames, bus)))
+    recording.send_blueprint(blueprint(log, fields, reach))
     _add_shapes(rr, recording, shapes, frames, bus)
+    _add_arrows(rr, recording, arrows_of(log, frames, reach), _THICKNESS * reach)
     _add_events(rr, recording, log)
     palette = np.array([int(f"{color[1:]}ff", 16) for color in COLORS], np.uint32)
     for signal in chosen:
@@ -165,6 +169,18 @@ def _add_shapes(
     if bus in frames:
         upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(frames[bus].time), 1))
         _add_frames(rr, recording, FOLLOW, frames[bus]._replace(quaternion=upright))
+
+
+def _add_arrows(rr: Any, recording: Any, found: list[Arrows], radius: float) -> None:
+    for each in found:
+        path = f"{WORLD}/arrows/{each.name}"
+        color = [round(255 * part) for part in each.color]
+        recording.log(path, rr.Arrows3D.from_fields(colors=[color], radii=[radius]), static=True)
+        count = np.full(len(each.time), each.vector.shape[1])
+        columns = rr.Arrows3D.columns(
+            vectors=each.vector.reshape(-1, 3), origins=each.origin.reshape(-1, 3)
+        )
+        recording.send_columns(path, _times(rr, each.time), columns.partition(count))
 
 
 def _add_frames(rr: Any, recording: Any, path: str, frames: Frames) -> None:

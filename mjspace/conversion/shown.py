@@ -13,6 +13,7 @@ from mjspace.contract import Array
 from mjspace.errors import InputError
 from mjspace.log.encoding import HEADER
 from mjspace.log.reader import Log
+from mjspace.log.scene import REFERENCE
 
 
 class Frames(NamedTuple):
@@ -59,11 +60,16 @@ def bus_of(log: Log) -> str:
     truth = next(log.blocks("/truth", ["position", "attitude"]), None)
     for record in log.records("/tf"):
         found = _parsed(log, "/tf", FrameTransforms, record).transforms
-        places = {each.child_frame_id: np.array(_row(each)[1:]) for each in found}
+        places = {
+            each.child_frame_id: np.array(_row(each)[1:])
+            for each in found
+            if each.child_frame_id != REFERENCE
+        }
         if truth is None:
-            return next(iter(places), "world")
-        begin = np.concatenate([truth["position"][0], truth["attitude"][0]])
-        return min(places, key=lambda name: float(np.abs(places[name] - begin).max()))
+            return str(next(iter(places), "world"))
+        begin: Array = np.concatenate([truth["position"][0], truth["attitude"][0]])
+        away = {name: float(np.abs(place - begin).max()) for name, place in places.items()}
+        return str(min(away, key=away.__getitem__))
     return "world"
 
 

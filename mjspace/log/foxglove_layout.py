@@ -40,10 +40,10 @@ class Plot(NamedTuple):
     """Its curves, as ``/truth.rate[0]``."""
 
 
-def layout(bus: str, topics: Topics) -> bytes:
+def layout(bus: str, topics: Topics, *, video: bool = False) -> bytes:
     """Return the layout as both import it; the view follows the body ``bus``.
 
-    ``topics`` are the fields and their shapes by topic.
+    ``topics`` are the fields and their shapes by topic; with ``video`` /video is shown.
     """
     configs: dict[str, object] = {
         "3D!scene": {
@@ -70,6 +70,9 @@ def layout(bus: str, topics: Topics) -> bytes:
         "direction": "column",
         "splitPercentage": 80,
     }
+    if video:
+        configs["Image!video"] = {"imageMode": {"imageTopic": "/video"}}
+        tree = {"first": "Image!video", "second": tree, "direction": "column"}
     for column, share in ((plots[:half], 40), (plots[half:], 60)):
         if column:
             tree = {
