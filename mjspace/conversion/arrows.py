@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from mjspace.attitude import rotate
+from mjspace.attitude import conjugate, rotate
 from mjspace.contract import Array
 from mjspace.conversion.shown import Frames
 from mjspace.log.flown_scenario import scenario_of
@@ -37,19 +37,22 @@ _THRUST = (1.0, 0.45, 0.1)
 
 
 class Arrows(NamedTuple):
-    """Arrows of one kind over time, in ``world``."""
+    """Arrows of one kind over time, in the bus's frame.
+
+    A viewer shows the last ones until the next: in ``world`` they would lag behind a fast vehicle.
+    """
 
     name: str
     color: tuple[float, float, float]
     time: Array
     """s, shape (n,)."""
     origin: Array
-    """m, shape (n, k, 3)."""
+    """From the bus [m], body axes, shape (n, k, 3)."""
     vector: Array
-    """From there to the arrow's point [m], shape (n, k, 3)."""
+    """From there to the arrow's point [m], body axes, shape (n, k, 3)."""
 
 
-def arrows_of(log: Log, frames: Mapping[str, Frames], reach: float) -> list[Arrows]:
+def arrows_of(log: Log, frames: Mapping[str, Frames], bus: str, reach: float) -> list[Arrows]:
     """Return the arrows of what acted in a log, at most 20 times a second.
 
     The longest of each kind is as long as the vehicle's ``reach`` [m], the others in proportion.
@@ -60,26 +63,26 @@ def arrows_of(log: Log, frames: Mapping[str, Frames], reach: float) -> list[Arro
         ValueError: the log lacks its scenario or model, or is damaged.
     """
     every = max(round(_PERIOD / log.control_period), 1)
-    truth = log.read("/truth", ["position", "attitude"], every=_stride(log, "/truth", every))
+    truth = log.read("/truth", ["attitude"], every=_stride(log, "/truth", every))
     found = []
     for kind in _AT_BUS:
         if log.topics.get(kind.topic, {}).get(kind.field) != (3,):
             continue
         rows = log.read(kind.topic, [kind.field], every=_stride(log, kind.topic, every))
-        here = _nearest(truth["time"], rows["time"])
         values = rows[kind.field]
-        if kind.in_body:
-            values = rotate(truth["attitude"][here], values)
-        place = truth["position"][here]
-        found.append(Arrows(kind.name, kind.color, rows["time"], place[:, None], values[:, None]))
-    found += _thrusts(log, frames, every)
+        if not kind.in_body:
+            here = _nearest(truth["time"], rows["time"])
+            values = rotate(conjugate(truth["attitude"][here]), values)
+        origin = np.zeros((len(values), 1, 3))
+        found.append(Arrows(kind.name, kind.color, rows["time"], origin, values[:, None]))
+    found += _thrusts(log, frames, bus, every)
     scaled = (each._replace(vector=reach * _of_largest(each.vector)) for each in found)
     return [
         _pushing(each) if each.name == "thrust" else each for each in scaled if each.vector.any()
     ]
 
 
-def _thrusts(log: Log, frames: Mapping[str, Frames], every: int) -> Iterator[Arrows]:
+def _thrusts(log: Log, frames: Mapping[str, Frames], bus: str, every: int) -> Iterator[Arrows]:
     """Yield the thrust [N] of the engine and each thruster, in place of lengths."""
     count = int(np.prod(log.topics.get("/truth", {}).get("thrust", (0,))))
     if not count:
@@ -95,9 +98,11 @@ def _thrusts(log: Log, frames: Mapping[str, Frames], every: int) -> Iterator[Arr
         along = rotate(model.site_quat[site], model.actuator_gear[motor, :3])
         frame = frames[model.body(model.site_bodyid[site]).name]
         here = _nearest(frame.time, rows["time"])
-        turn = frame.quaternion[here]
-        origin[:, k] = frame.position[here] + rotate(turn, model.site_pos[site])
-        vector[:, k] = rows["thrust"][:, k, None] * rotate(turn, along / np.linalg.norm(along))
+        back, turn = conjugate(frames[bus].quaternion[here]), frame.quaternion[here]
+        place = frame.position[here] + rotate(turn, model.site_pos[site])
+        origin[:, k] = rotate(back, place - frames[bus].position[here])
+        push = rotate(back, rotate(turn, along / np.linalg.norm(along)))
+        vector[:, k] = rows["thrust"][:, k, None] * push
     yield Arrows("thrust", _THRUST, rows["time"], origin, vector)
 
 

@@ -87,7 +87,8 @@ def _add_all(
     fields = {(signal.topic, signal.field) for signal in chosen}
     recording.send_blueprint(blueprint(log, fields, reach))
     _add_shapes(rr, recording, shapes, frames, bus)
-    _add_arrows(rr, recording, arrows_of(log, frames, reach), _THICKNESS * reach)
+    place = f"{WORLD}/{bus}/arrows"
+    _add_arrows(rr, recording, place, arrows_of(log, frames, bus, reach), _THICKNESS * reach)
     _add_events(rr, recording, log)
     palette = np.array([int(f"{color[1:]}ff", 16) for color in COLORS], np.uint32)
     for signal in chosen:
@@ -171,9 +172,9 @@ def _add_shapes(
         _add_frames(rr, recording, FOLLOW, frames[bus]._replace(quaternion=upright))
 
 
-def _add_arrows(rr: Any, recording: Any, found: list[Arrows], radius: float) -> None:
+def _add_arrows(rr: Any, recording: Any, place: str, found: list[Arrows], radius: float) -> None:
     for each in found:
-        path = f"{WORLD}/arrows/{each.name}"
+        path = f"{place}/{each.name}"
         color = [round(255 * part) for part in each.color]
         recording.log(path, rr.Arrows3D.from_fields(colors=[color], radii=[radius]), static=True)
         count = np.full(len(each.time), each.vector.shape[1])

@@ -14,7 +14,7 @@ WORLD = "world"
 FOLLOW = f"{WORLD}/follow"
 """The entity of the frame that moves with the bus but does not turn."""
 _COLUMNS = 2  # of plots, beside the view
-_FROM = np.array([0.8, -2.0, 0.8])  # where the eye is, over the vehicle's extent
+_FROM = np.array([2.0, -0.85, 0.7])  # where the eye is, over the vehicle's extent
 
 
 def blueprint(log: Log, fields: Collection[tuple[str, str]], reach: float) -> Any:

@@ -36,21 +36,23 @@ def write(log: Log, file: BinaryIO, camera: str | None, progress: Callable[[floa
         NoRendererError: this machine cannot render; the message says what to install.
     """
     shapes, frames = shapes_of(log), frames_of(log)
-    reach = extent(shapes, frames, bus_of(log))
+    bus = bus_of(log)
+    reach = extent(shapes, frames, bus)
     kinds: dict[str, Any] = {ARROWS: SceneUpdate}
-    added = [_drawn(each, _THICKNESS * reach) for each in arrows_of(log, frames, reach)]
+    found = arrows_of(log, frames, bus, reach)
+    added = [_drawn(each, bus, _THICKNESS * reach) for each in found]
     if camera is not None:
         kinds[VIDEO] = CompressedVideo
         added.append(_video(log, camera, progress))
     copy_with(log.path, file, kinds, heapq.merge(*added, key=lambda each: each[1]))
 
 
-def _drawn(arrows: Arrows, thickness: float) -> Messages:
+def _drawn(arrows: Arrows, bus: str, thickness: float) -> Messages:
     """Yield the arrows of one kind: an entity that each message replaces."""
     for time, origins, vectors in zip(arrows.time, arrows.origin, arrows.vector, strict=True):
         stamp = round(float(time) * 1e9)
         update = SceneUpdate()
-        entity = update.entities.add(frame_id="world", id=arrows.name)
+        entity = update.entities.add(frame_id=bus, id=arrows.name, frame_locked=True)
         entity.timestamp.FromNanoseconds(stamp)
         for origin, vector in zip(origins, vectors, strict=True):
             length = float(np.linalg.norm(vector))

@@ -44,6 +44,7 @@ def arrows(copy: Log, name: str) -> list[tuple[float, Array, float]]:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for _, _, message, update in reader.iter_decoded_messages(["/arrows"]):
             (entity,) = update.entities
+            assert (entity.frame_id, entity.frame_locked) == ("bus", True)
             for arrow in entity.arrows if entity.id == name else ():
                 turn = arrow.pose.orientation
                 along = rotate(np.array([turn.w, turn.x, turn.y, turn.z]), np.array([1.0, 0, 0]))
@@ -70,25 +71,32 @@ def test_arrows_are_along_what_acts_and_in_proportion(log: Log, copy: Log) -> No
     reach = extent(shapes_of(log), frames_of(log), "bus")
     lengths = np.array([length for _, _, length in found])
     assert lengths.max() == pytest.approx(reach)
-    wanted = []
+    wanted, norm = [], np.linalg.norm(log.nearest("/truth", 0.0)["momentum"])
     for time, along, _ in found:
         torque = log.nearest("/command", time)["torque"]
-        inertial = rotate(log.nearest("/truth", time)["attitude"], torque)
         wanted.append(np.linalg.norm(torque))
-        np.testing.assert_allclose(along, inertial / wanted[-1], atol=1e-9)
+        np.testing.assert_allclose(along, torque / wanted[-1], atol=1e-9)
     np.testing.assert_allclose(lengths / reach, np.array(wanted) / max(wanted), rtol=1e-9)
+    for time, along, length in arrows(copy, "momentum"):
+        truth = log.nearest("/truth", time)
+        turned = rotate(truth["attitude"], length * along)  # inertial: it does not change
+        np.testing.assert_allclose(turned / reach, truth["momentum"] / norm, atol=1e-6)
     times = np.array([time for time, _, _ in found])
     assert np.diff(times).min() >= 0.05 - 1e-9  # at most 20 Hz
 
 
 def test_a_thrust_pushes_at_its_place(tmp_path: Path) -> None:
     log = run("lander", overrides=["duration=0.2", "checks=[]"], out=tmp_path).log
-    (thrust,) = (a for a in arrows_of(log, frames_of(log), 1.0) if a.name == "thrust")
-    nozzle = frames_of(log)["engine_nozzle"]
-    up = rotate(nozzle.quaternion[0], np.array([0.0, 0.0, 1.0]))
-    vector = thrust.vector[0, 0]
+    frames = frames_of(log)
+    (thrust,) = (a for a in arrows_of(log, frames, "bus", 1.0) if a.name == "thrust")
+    nozzle, bus = frames["engine_nozzle"], frames["bus"]
+    up = rotate(nozzle.quaternion[-1], np.array([0.0, 0.0, 1.0]))
+    assert thrust.time[-1] == nozzle.time[-1]
+    vector, origin = (
+        rotate(bus.quaternion[-1], each[-1, 0]) for each in (thrust.vector, thrust.origin)
+    )
     np.testing.assert_allclose(vector / np.linalg.norm(vector), up, atol=1e-9)
-    tip = thrust.origin[0, 0] + vector - nozzle.position[0]
+    tip = bus.position[-1] + origin + vector - nozzle.position[-1]
     np.testing.assert_allclose(np.cross(tip, up), 0.0, atol=1e-9)  # on the nozzle's axis
 
 
