@@ -55,7 +55,8 @@ class Arrows(NamedTuple):
 def arrows_of(log: Log, frames: Mapping[str, Frames], bus: str, reach: float) -> list[Arrows]:
     """Return the arrows of what acted in a log, at most 20 times a second.
 
-    The longest of each kind is as long as the vehicle's ``reach`` [m], the others in proportion.
+    The longest of each kind is as long as the vehicle's ``reach`` [m], the others in proportion;
+    of thrust, twice that.
     Torques and momentum begin at the bus; a thrust ends where it acts. What was zero throughout
     has no arrow.
 
@@ -107,8 +108,9 @@ def _thrusts(log: Log, frames: Mapping[str, Frames], bus: str, every: int) -> It
 
 
 def _pushing(arrows: Arrows) -> Arrows:
-    """Return arrows that end where they began."""
-    return arrows._replace(origin=arrows.origin - arrows.vector)
+    """Return arrows of twice the length, so that nozzles do not hide them, that end at the origin."""
+    vector = 2.0 * arrows.vector
+    return arrows._replace(origin=arrows.origin - vector, vector=vector)
 
 
 def _stride(log: Log, topic: str, every: int) -> int:
