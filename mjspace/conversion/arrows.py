@@ -108,7 +108,7 @@ def _thrusts(log: Log, frames: Mapping[str, Frames], bus: str, every: int) -> It
 
 
 def _pushing(arrows: Arrows) -> Arrows:
-    """Return arrows of twice the length, so that nozzles do not hide them, that end at the origin."""
+    """Return arrows twice as long, which nozzles do not hide, that end at the origin."""
     vector = 2.0 * arrows.vector
     return arrows._replace(origin=arrows.origin - vector, vector=vector)
 
