@@ -23,7 +23,7 @@ __version__ = "0.1.0"
 _MODULES = {
     "Log": "mjspace.runner.shown_log",
     "compare": "mjspace.log.compare",
-    "convert": "mjspace.log.convert",
+    "convert": "mjspace.conversion.convert",
     "figure": "mjspace.plotting.page",
     "linearize": "mjspace.simulation.linearization",
     "list_scenarios": "mjspace.scenario.files",

@@ -57,13 +57,19 @@ ROOMS = {
     "campaign": "contract errors interrupts log reporting runner scenario simulation units",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
+    "conversion": "attitude contract errors log plotting rendering",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
-    "cli": "campaign errors log plotting rendering runner scenario simulation terminal validation",
+    "cli": (
+        "campaign conversion errors log plotting rendering runner scenario simulation terminal "
+        "validation"
+    ),
     "__main__": "cli interrupts",
 }
 # Outside packages that a few rooms alone may know.
 ONLY_IN = {
-    "mujoco": "vehicle environment actuators simulation log rendering dm_env runner validation",
+    "mujoco": (
+        "vehicle environment actuators simulation log rendering dm_env runner validation conversion"
+    ),
     "mcap": "log",
     "dm_control": "dm_env",
     "dm_env": "dm_env",

@@ -2,11 +2,11 @@
 
 ``campaign`` flies a scenario many times, ``falsify`` searches for a flight that fails, ``margins``
 says how much worse it may become, ``tune`` finds gains. ``report`` makes an HTML page of logs or a
-campaign. ``convert`` and ``compare`` are for logs, ``law-header``, ``serve-law`` and ``linearize``
-for flight software; ``recover`` saves what is whole of a damaged log. Exit status: 0 every check
-came out as the scenario expects, 1 flown but one did not (or a replay or a comparison differed, or
-the flight ended early), 2 bad input. Modules are imported when a command needs them: ``--help``
-answers at once.
+campaign. ``convert``, ``layout`` and ``compare`` are for logs, ``law-header``, ``serve-law`` and
+``linearize`` for flight software; ``recover`` saves what is whole of a damaged log. Exit status: 0
+every check came out as the scenario expects, 1 flown but one did not (or a replay or a comparison
+differed, or the flight ended early), 2 bad input. Modules are imported when a command needs them:
+``--help`` answers at once.
 """
 
 import sys
@@ -67,6 +67,7 @@ app.command()(pictures.render)
 app.command()(pictures.plot)
 app.command()(reports.report)
 app.command()(data.convert)
+app.command()(data.layout)
 app.command()(data.compare)
 app.command()(flight_software.law_header)
 app.command()(flight_software.serve_law)

@@ -1,4 +1,4 @@
-"""The commands ``mjspace convert`` and ``mjspace compare``: logs for other tools, and in pairs."""
+"""The commands ``convert``, ``layout`` and ``compare``: logs for other tools, and in pairs."""
 
 import dataclasses
 import json
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mjspace.cli.campaigns import compare_campaigns
-from mjspace.errors import InputError, input_error_at
+from mjspace.errors import InputError, input_error_at, whole_or_none
 from mjspace.terminal.options import Json, LogFile
 from mjspace.terminal.reporting import open_log, progress_bar
 
@@ -30,19 +30,49 @@ SHOWN = 20
 def convert(
     log: LogFile,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="x.csv, x.parquet, x.npz or x.mat.")
+        Path,
+        typer.Option("-o", "--output", help="x.csv, .parquet, .npz, .mat, .rrd or .mcap."),
     ],
     signals: Signals = [],  # noqa: B006
     topics: Topics = [],  # noqa: B006
     rate: Annotated[
         float | None, typer.Option(help="Rows a second; all of the log's when left out.")
     ] = None,
+    video: Annotated[
+        str | None,
+        typer.Option(metavar="CAMERA", help="In x.mcap, also the pictures of this camera: chase."),
+    ] = None,
 ) -> None:
-    """Write a log's signals as a table or arrays for other tools."""
-    from mjspace.log.convert import convert as to_file
+    """Write a log for other tools: a table, arrays, or for viewers.
+
+    x.rrd is a recording for Rerun; x.mcap a copy of the log with arrows, for Foxglove, Lichtblick
+    and Rerun.
+    """
+    from mjspace.conversion.convert import convert as to_file
 
     with progress_bar(open_log(log).end, "converting") as progress, input_error_at("convert"):
-        to_file(log, output, signals=signals, topics=topics, rate=rate, progress=progress)
+        to_file(
+            log, output, signals=signals, topics=topics, rate=rate, camera=video, progress=progress
+        )
+    print(output)
+
+
+def layout(
+    log: LogFile,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="A file for Foxglove and Lichtblick: x.json.")
+    ],
+) -> None:
+    """Write the panels of what flew in a log, for import in Foxglove or Lichtblick."""
+    from mjspace.conversion.shown import bus_of
+    from mjspace.log import foxglove_layout
+
+    opened = open_log(log)
+    if output.suffix != ".json":
+        raise InputError(f"layout: output '{output}': end it in .json")
+    with input_error_at("layout"), whole_or_none(output) as file:
+        video = next(opened.records("/video"), None) is not None
+        file.write(foxglove_layout.layout(bus_of(opened), opened.topics, video=video))
     print(output)
 
 

@@ -1,8 +1,9 @@
-"""The layout attached to each log, for Foxglove and Lichtblick: a 3D view, plots of what flew."""
+"""The layout of Foxglove and Lichtblick for a log: a 3D view, events, plots of what flew."""
 
 import json
 import math
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 Topics = Mapping[str, Mapping[str, tuple[int, ...]]]
 
@@ -29,29 +30,49 @@ _ONLY_ON_GROUND = {"velocity"}
 _CURVES = 12  # in a plot
 
 
-def layout(bus: str, topics: Topics) -> bytes:
+class Plot(NamedTuple):
+    """What a plot shows of a field of a topic."""
+
+    title: str
+    topic: str
+    field: str
+    paths: tuple[str, ...]
+    """Its curves, as ``/truth.rate[0]``."""
+
+
+def layout(bus: str, topics: Topics, *, video: bool = False) -> bytes:
     """Return the layout as both import it; the view follows the body ``bus``.
 
-    ``topics`` are the fields and their shapes by topic.
+    ``topics`` are the fields and their shapes by topic; with ``video`` /video is shown.
     """
     configs: dict[str, object] = {
         "3D!scene": {
             "followTf": bus,
             "followMode": "follow-position",
-            "topics": {"/scene": {"visible": True}},
-        }
+            "topics": {"/scene": {"visible": True}, "/arrows": {"visible": True}},
+        },
+        "RosOut!events": {"topicToRender": "/events"},
     }
     plots = []
-    for number, (title, paths) in enumerate(_plots(topics)):
+    for number, plot in enumerate(plots_of(topics)):
         plots.append(f"Plot!{number}")
         configs[plots[-1]] = {
-            "foxglovePanelTitle": title,
+            "foxglovePanelTitle": plot.title,
             "paths": [
-                {"value": path, "enabled": True, "timestampMethod": "receiveTime"} for path in paths
+                {"value": path, "enabled": True, "timestampMethod": "receiveTime"}
+                for path in plot.paths
             ],
         }
     half = (len(plots) + 1) // 2
-    tree: object = "3D!scene"
+    tree: object = {
+        "first": "3D!scene",
+        "second": "RosOut!events",
+        "direction": "column",
+        "splitPercentage": 80,
+    }
+    if video:
+        configs["Image!video"] = {"imageMode": {"imageTopic": "/video"}}
+        tree = {"first": "Image!video", "second": tree, "direction": "column"}
     for column, share in ((plots[:half], 40), (plots[half:], 60)):
         if column:
             tree = {
@@ -64,8 +85,8 @@ def layout(bus: str, topics: Topics) -> bytes:
     return json.dumps(whole, indent=1).encode()
 
 
-def _plots(topics: Topics) -> Iterator[tuple[str, list[str]]]:
-    """Yield the title and the message paths of each plot."""
+def plots_of(topics: Topics) -> Iterator[Plot]:
+    """Yield the plots of what flew, at most ``MOST``."""
     left = MOST
     on_ground = "altitude" in topics.get("/truth", {})
     for title, topic, field in SIGNALS:
@@ -75,7 +96,8 @@ def _plots(topics: Topics) -> Iterator[tuple[str, list[str]]]:
         left -= 1
         path = f"{topic}.{field}"
         single = topics[topic][field] in ((), (1,))
-        yield title, [path] if single else [f"{path}[{i}]" for i in range(min(count, _CURVES))]
+        paths = [path] if single else [f"{path}[{i}]" for i in range(min(count, _CURVES))]
+        yield Plot(title, topic, field, tuple(paths))
 
 
 def _stack(panels: list[str]) -> object:

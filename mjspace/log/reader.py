@@ -233,13 +233,16 @@ class Log:
         Raises:
             InputError: a chunk or an entry is damaged.
         """
-        events = []
-        for content in self._contents(self._topics_of(["/events"]), self._found.chunks):
+        found = list(self.records("/events"))
+        with self._damage_of("/events"):
+            return [checked.event(record) for record in found]
+
+    def records(self, topic: str) -> Iterator[bytes]:
+        """Yield the Message records of any topic, each whole; InputError: a chunk is damaged."""
+        for content in self._contents(self._topics_of([topic]), self._found.chunks):
             for channel in content.channels:
-                with self._damage_of("/events"):
-                    entries = [checked.event(record) for record in content.records(channel)]
-                events += entries
-        return events
+                with self._damage_of(topic):
+                    yield from content.records(channel)
 
     @cached_property
     def _ends(self) -> tuple[np.void, np.void] | None:

@@ -21,6 +21,12 @@ _THICKNESS = 0.02  # m, of a plane
 _CELLS = 100  # of a height field, along an edge, as it is drawn
 
 
+REFERENCE = "reference"
+"""The frame of the desired attitude: at the desired position, or at the bus where none is."""
+_AXES = 3  # the group of a bus's axes, as of its geom bus_axis_x
+_HALO, _TRANSLUCENT = 2.2, 0.4  # the desired axes' thickness over the body's, and their opacity
+
+
 class _Shape(NamedTuple):
     """A box, a cylinder along z, an ellipsoid or a mesh, in the axes of its body."""
 
@@ -38,21 +44,42 @@ def scene(model: Any) -> Scene:
     The world's own shapes are in frame ``world``, but for scenery beyond ``FARTHEST``. A plane is a
     thin box, a height field a mesh of fewer cells; what has a texture has its mean color. URDF has
     no meshes of its own: they are left out of it, and an ellipsoid is the sphere of its volume.
+    The last frame is ``REFERENCE``, where no body has that name: it has the bus's axes once more.
     """
     names = [model.body(i).name for i in range(model.nbody)]
     shapes = {name: list(_shapes(model, i)) for i, name in enumerate(names)}
-    return Scene(tuple(names[1:]), _update(shapes), _urdf(shapes))
+    if model.nbody > 1 and REFERENCE not in names:
+        shapes[REFERENCE] = [_halo(each) for i in _axes(model) for each in _shape(model, i)]
+    return Scene(tuple(shapes)[1:], _update(shapes), _urdf(shapes))
+
+
+def _axes(model: Any) -> list[int]:
+    """Return the geoms of the axes that the bus, which the first joint moves, is drawn with."""
+    bus = model.jnt_bodyid[0] if model.njnt else 0
+    here = np.flatnonzero((model.geom_bodyid == bus) & (model.geom_group == _AXES))
+    return [i for i in here.tolist() if "axis_" in model.geom(i).name]
+
+
+def _halo(shape: _Shape) -> _Shape:
+    """Return an axis as that of the desired attitude: thicker, and translucent."""
+    long = np.argmax(shape.size) if shape.kind == "cylinder" else -1
+    size = np.where(np.arange(3) == long, shape.size, _HALO * shape.size)
+    return shape._replace(size=size, color=shape.color * [1.0, 1.0, 1.0, _TRANSLUCENT])
 
 
 def _shapes(model: Any, body: int) -> Iterator[_Shape]:
-    first = model.body_geomadr[body]
+    first, axes = model.body_geomadr[body], _axes(model)
     for i in range(first, first + model.body_geomnum[body]):
-        color = _color(model, i)
-        if model.geom_group[i] >= _SHOWN_GROUPS or color[3] == 0.0:
-            continue
         reach = np.linalg.norm(model.geom_pos[i]) + model.geom_rbound[i]
-        if body == 0 and reach > FARTHEST:
-            continue
+        scenery = body == 0 and reach > FARTHEST
+        if not scenery and (model.geom_group[i] < _SHOWN_GROUPS or i in axes):
+            yield from _shape(model, i)
+
+
+def _shape(model: Any, i: int) -> Iterator[_Shape]:
+    """Yield the shapes of a geom, none of what is fully transparent."""
+    color = _color(model, i)
+    if color[3] > 0.0:
         kind, size = _GEOM(int(model.geom_type[i])), model.geom_size[i]
         at = model.geom_pos[i], model.geom_quat[i]
         if kind in (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID):

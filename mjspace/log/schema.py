@@ -98,7 +98,7 @@ def channels(
         if topic == "/location" and not located:
             continue
         described = message.DESCRIPTOR
-        declare(topic, described.full_name, "protobuf", _descriptor_of(described.file), {})
+        declare(topic, described.full_name, "protobuf", descriptor_of(described.file), {})
     declare("/robot_description", "std_msgs/msg/String", "ros2msg", b"string data", {})
     return schemas, declared
 
@@ -125,7 +125,7 @@ def file_of(message: str, fields: Fields) -> FileDescriptorProto:
     return file
 
 
-def _descriptor_of(file: FileDescriptor) -> bytes:
+def descriptor_of(file: FileDescriptor) -> bytes:
     """Return the serialized FileDescriptorSet of a compiled .proto file and all that it imports."""
     found: dict[str, FileDescriptorProto] = {}
 

@@ -63,7 +63,7 @@ def render(
         )
     if output.suffix == ".png":
         times: Array = np.array([_still_time(log, at)])
-        (frame,) = _frames(log, times, camera, size)
+        (frame,) = frames_at(log, times, camera, size)
         with whole_or_none(output) as file:
             Image.fromarray(frame).save(file, format="png")
         return
@@ -77,7 +77,7 @@ def render(
     count = int((log.end - log.start) / period + 1e-9) + 1
     times = np.linspace(log.start, log.start + period * (count - 1), count)
     with Video(output, size, rate) as video:
-        for time, frame in zip(times, _frames(log, times, camera, size), strict=True):
+        for time, frame in zip(times, frames_at(log, times, camera, size), strict=True):
             video.write(frame)
             progress(float(time))
 
@@ -115,9 +115,15 @@ def _still_time(log: Log, at: float | None) -> float:
     return at
 
 
-def _frames(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Iterator[Frame]:
+def frames_at(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Iterator[Frame]:
+    """Yield the picture of a log at each of the ascending ``times`` (n,) [s], as ``render`` does.
+
+    Raises:
+        ValueError: an unknown camera, or a time that was not logged.
+        NoRendererError: this machine cannot render; the message says what to install.
+    """
     scenario = scenario_of(log)
-    stage = Stage(_model(log, scenario), camera, scenario.environment.orbit)
+    stage = Stage(flown_model(log, scenario), camera, scenario.environment.orbit)
     left = scenario.name, scenario.law.kind
     with Canvas(stage.model, size) as canvas:
         for time, physics, desired, pulses, thrust, caption in zip(
@@ -147,8 +153,8 @@ def _pulses(log: Log, times: Array) -> Iterable[Array | None]:
     return (np.maximum.reduce(rows) for rows in zip(*each, strict=True))
 
 
-def _model(log: Log, scenario: Scenario) -> Any:
-    """Return the model that flew in the log."""
+def flown_model(log: Log, scenario: Scenario) -> Any:
+    """Return the model that flew in the log, as far as a stranger's may be trusted."""
     size = userdata_size(scenario.environment, scenario.plant)
     with warnings.catch_warnings(action="ignore"):  # it was said when it flew
         source = model_of(log, scenario)

@@ -1,5 +1,6 @@
-"""Encodes a video frame by frame: H.264 in an MP4 file."""
+"""Encodes a video frame by frame: H.264 in an MP4 file, or as access units."""
 
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -51,9 +52,7 @@ class Video:
 
     def write(self, frame: Frame) -> None:
         """Append a frame."""
-        picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
-        picture = picture.reformat(format="yuv420p", dst_colorspace=Colorspace.ITU709)
-        self._file.mux(self._stream.encode(picture))
+        self._file.mux(self._stream.encode(_picture(frame)))
 
     def __enter__(self) -> Self:
         return self
@@ -78,3 +77,29 @@ class Video:
                 self._file.mux(self._stream.encode(None))
         finally:
             self._file.close()
+
+
+def _picture(frame: Frame) -> av.VideoFrame:
+    picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
+    return picture.reformat(format="yuv420p", dst_colorspace=Colorspace.ITU709)
+
+
+def access_units(frames: Iterable[Frame], size: tuple[int, int], rate: int) -> Iterator[bytes]:
+    """Yield each frame as an H.264 access unit in Annex B, a key frame in each second.
+
+    As ``foxglove.CompressedVideo`` wants it: no frame refers to a later one, and the parameter sets
+    stand before each key frame, so that a viewer can begin there.
+    """
+    context = av.CodecContext.create("libx264", "w")
+    context.width, context.height = size
+    context.pix_fmt, context.time_base = "yuv420p", Fraction(1, rate)
+    context.colorspace = context.color_primaries = context.color_trc = BT709
+    context.options = _OPTIONS | {
+        "tune": "zerolatency",  # a frame in, its access unit out
+        "x264-params": f"bframes=0:keyint={rate}:scenecut=0:repeat-headers=1:annexb=1",
+    }
+    for number, frame in enumerate(frames):
+        picture = _picture(frame)
+        picture.pts = number
+        yield from map(bytes, context.encode(picture))
+    yield from map(bytes, context.encode(None))

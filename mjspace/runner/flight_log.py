@@ -131,21 +131,30 @@ class FlightLog:
         else:
             self._log.write_locations(time, values)
 
-    def _write_frames(self, time: Array, states: Array) -> None:
-        """Log the bodies' frames at ``time`` (n,) [s], of MuJoCo's ``states`` (n, nstate)."""
-        positions = np.empty((len(time), self._model.nbody - 1, 3))
-        quaternions = np.empty((len(time), self._model.nbody - 1, 4))
+    def _write_frames(self, time: Array, rows: Array) -> None:
+        """Log frames at ``time`` (n,) [s]: of the ``rows`` (n, nstate + 7) of ``_shown``."""
+        states, desired = rows[:, :-7], rows[:, -7:]
+        # Where a body has the reference's name, the last one is not logged.
+        positions = np.empty((len(time), self._model.nbody, 3))
+        quaternions = np.empty((len(time), self._model.nbody, 4))
         for i, state in enumerate(states):
             mujoco.mj_setState(self._model, self._data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
             mujoco.mj_kinematics(self._model, self._data)
-            positions[i], quaternions[i] = self._data.xpos[1:], self._data.xquat[1:]
+            positions[i, :-1], quaternions[i, :-1] = self._data.xpos[1:], self._data.xquat[1:]
+        positions[:, -1], quaternions[:, -1] = desired[:, :3], desired[:, 3:]
         self._log.write_transforms(time, positions, quaternions)
 
 
 def _shown(rows: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
-    """Return what goes on each topic for viewers, (n, k): states, and places on the Earth."""
-    truth = rows["/truth"]
-    found = {"/tf": rows["/state"]["physics"]}
+    """Return what goes on each topic for viewers, (n, k): states, and places on the Earth.
+
+    A row for /tf ends with the frame of the reference: its position, or else the bus's, and its
+    attitude.
+    """
+    truth, reference = rows["/truth"], rows["/reference"]
+    place = reference.get("position", truth["position"])
+    shown = [rows["/state"]["physics"], place, reference["attitude"]]
+    found = {"/tf": np.hstack(shown)}
     if "latitude" in truth:
         angles = np.degrees(np.hstack([truth["latitude"], truth["longitude"]]))
         found["/location"] = np.hstack([angles, truth["height"]])

@@ -74,13 +74,14 @@ def color(message: Any) -> list[float]:
 def test_each_body_is_a_frame_an_entity_and_a_link(
     model: Any, entities: dict[str, Any], robot: Any
 ) -> None:
-    assert scene(model).bodies == ("bus", "wheel_0", "boom")
-    assert set(entities) == {"world", "bus", "wheel_0", "boom"}
+    assert scene(model).bodies == ("bus", "wheel_0", "boom", "reference")
+    assert set(entities) == {"world", "bus", "wheel_0", "boom", "reference"}
     assert [link.get("name") for link in robot.findall("link")] == [
         "world",
         "bus",
         "wheel_0",
         "boom",
+        "reference",
     ]
     # One tree: each body but the world is the child of exactly one joint, as it is on /tf.
     joints = {
@@ -88,7 +89,7 @@ def test_each_body_is_a_frame_an_entity_and_a_link(
         for joint in robot.findall("joint")
     }
     assert joints == dict.fromkeys(scene(model).bodies, "world")
-    assert len(robot.findall("joint")) == 3
+    assert len(robot.findall("joint")) == 4
     assert all(entity.frame_locked for entity in entities.values())
 
 
@@ -217,7 +218,7 @@ LANDER = {
 def paths_of(topics: Any) -> list[str]:
     found = layout("hub", topics).decode()
     whole = json.loads(found)
-    panels = re.findall(r"(?:3D|Plot)!\w+", json.dumps(whole["layout"]))
+    panels = re.findall(r"(?:3D|RosOut|Plot)!\w+", json.dumps(whole["layout"]))
     assert sorted(panels) == sorted(whole["configById"])
     return re.findall(r'"value": "([^"]+)"', found)
 
@@ -277,3 +278,33 @@ def test_textures_have_their_mean_color_and_scenery_is_left_out() -> None:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (normals[:, 2] > 0.0).all()
     assert normals[:, 2].sum() / 2.0 == pytest.approx(8.0 * 12.0)  # its triangles cover it
+
+
+def test_the_desired_attitude_has_the_axes_of_the_bus_thicker_and_translucent() -> None:
+    model = mujoco.MjModel.from_xml_string("""
+<mujoco>
+  <worldbody>
+    <body name="bus">
+      <freejoint/>
+      <geom type="box" size="1 1 1"/>
+      <geom name="bus_axis_x" type="capsule" size="0.1" fromto="0 0 0 3 0 0" group="3"
+            rgba="1 0 0 1"/>
+    </body>
+  </worldbody>
+</mujoco>""")
+    found = scene(model)
+    assert found.bodies == ("bus", "reference")
+    drawn = {e.frame_id: e for e in SceneUpdate.FromString(found.update).entities}
+    (own,), (desired,) = drawn["bus"].cylinders, drawn["reference"].cylinders
+    assert desired.pose == own.pose
+    assert desired.size.z == own.size.z == pytest.approx(3.0)
+    assert desired.size.x > own.size.x
+    assert (own.color.a, desired.color.a) == (1.0, 0.4)
+
+
+def test_a_body_of_the_references_name_is_drawn_in_its_place() -> None:
+    model = mujoco.MjModel.from_xml_string("""
+<mujoco>
+  <worldbody><body name="reference"><freejoint/><geom size="1"/></body></worldbody>
+</mujoco>""")
+    assert scene(model).bodies == ("reference",)

@@ -22,7 +22,7 @@ from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering import overlay
 from mjspace.rendering.offscreen import Canvas
-from mjspace.rendering.render import _frames, captions, nearest_rows, render, shares_of_thrust
+from mjspace.rendering.render import captions, frames_at, nearest_rows, render, shares_of_thrust
 from mjspace.rendering.scene import Stage
 from mjspace.rendering.video import Frame, Video
 from mjspace.vehicle.vehicle import from_mjb
@@ -291,10 +291,10 @@ def test_a_log_that_is_damaged_further_on_leaves_no_still(
     pictured_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def damaged(*arguments: Any) -> Iterator[Frame]:
-        yield from _frames(*arguments)
+        yield from frames_at(*arguments)
         raise ValueError("time does not go on")
 
-    monkeypatch.setattr("mjspace.rendering.render._frames", damaged)
+    monkeypatch.setattr("mjspace.rendering.render.frames_at", damaged)
     with pytest.raises(ValueError, match="time does not go on"):
         render(pictured_log, tmp_path / "x.png", size=(64, 48))
     assert not list(tmp_path.iterdir())

@@ -76,12 +76,19 @@ def test_frames_are_those_of_the_state(log: Log) -> None:
         assert round(float(row["time"]) * 1e9) == stamp
         mujoco.mj_setState(model, data, row["physics"], mujoco.mjtState.mjSTATE_INTEGRATION)
         mujoco.mj_kinematics(model, data)
-        assert len(message.transforms) == model.nbody - 1
-        for frame in message.transforms:
+        *bodies, reference = message.transforms
+        assert len(bodies) == model.nbody - 1
+        for frame in bodies:
             body = data.body(frame.child_frame_id)
             place, turn = frame.translation, frame.rotation
             assert [place.x, place.y, place.z] == body.xpos.tolist()
             assert [turn.w, turn.x, turn.y, turn.z] == body.xquat.tolist()
+        assert reference.child_frame_id == "reference"
+        place, turn = reference.translation, reference.rotation
+        wanted = log.nearest("/reference", stamp / 1e9)["attitude"]
+        assert [turn.w, turn.x, turn.y, turn.z] == wanted.tolist()
+        here = log.nearest("/truth", stamp / 1e9)["position"]  # none is desired
+        assert [place.x, place.y, place.z] == here.tolist()
     bus = next(t for t in found[100_000_000].transforms if t.child_frame_id == "bus")
     truth = log.nearest("/truth", 0.1)["attitude"]
     assert [bus.rotation.w, bus.rotation.x] == pytest.approx(truth[:2], rel=1e-14)

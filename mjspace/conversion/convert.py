@@ -1,4 +1,4 @@
-"""A log in the formats of other tools: CSV, Parquet, NumPy's and MATLAB's."""
+"""A log in the formats of other tools: CSV, Parquet, NumPy's, MATLAB's and Rerun's."""
 
 import csv
 import re
@@ -9,12 +9,16 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from mjspace.conversion import rerun, viewed
 from mjspace.errors import whole_or_none
 from mjspace.log.arrow import pyarrow_for
 from mjspace.log.columns import Signal, blocks, select, stride, table
 from mjspace.log.reader import Log
 
 Progress = Callable[[float], None]
+
+COPY = ".mcap"
+"""The ending of a log."""
 
 
 def convert(
@@ -24,26 +28,43 @@ def convert(
     signals: Sequence[str] = (),
     topics: Sequence[str] = (),
     rate: float | None = None,
+    camera: str | None = None,
     progress: Progress = lambda time: None,
 ) -> None:
-    """Write a log's signals as ``output``: .csv, .parquet, .npz or .mat.
+    """Write a log's signals as ``output``: .csv, .parquet, .npz, .mat, .rrd or .mcap.
 
     A table (.csv, .parquet) has a row for each instant, a column ``time`` [s] and one for each
     number, ``truth.rate[0]``, in SI units; where a topic has no row, the cell is empty. It is
     written chunk by chunk. The others hold an array for each signal and the times of each topic:
-    ``truth.time`` and ``truth.rate``, in MATLAB the fields of a struct ``truth``.
+    ``truth.time`` and ``truth.rate``, in MATLAB the fields of a struct ``truth``. A recording of
+    Rerun (.rrd) also has the shapes and frames of the bodies, the events and a layout.
+
+    ``.mcap`` is a copy of the log with arrows for viewers on /arrows, and with the pictures of
+    ``camera`` on /video where one is named.
 
     ``signals`` are named as in a check, ``topics`` as in the log; all but /state where neither is
     given. ``rate`` [Hz] leaves out rows: the control rate over a whole number.
 
     Raises:
         ValueError: another ending, no such signal or topic, or a rate that does not fit.
-        InputError: the log is damaged; or Parquet's library is not installed.
+        InputError: the log is damaged; or the library of Parquet or Rerun is not installed.
         OSError: a file cannot be read or written.
     """
     log, output = Log.of(log), Path(output)
+    if output.suffix == COPY:
+        if signals or topics or rate is not None:
+            raise ValueError(
+                f"output {str(output)!r}: has all of the log: leave signals, topics and rate out"
+            )
+        if output.resolve() == log.path.resolve():
+            raise ValueError(f"output {str(output)!r}: should not be the log itself")
+        with whole_or_none(output) as file:
+            viewed.write(log, file, camera, progress)
+        return
+    if camera is not None:
+        raise ValueError(f"output {str(output)!r}: a camera's video is for {COPY} alone")
     if output.suffix not in WRITERS:
-        endings = ", ".join(WRITERS)
+        endings = ", ".join([*WRITERS, COPY])
         raise ValueError(f"output {str(output)!r}: end it in one of {endings}")
     chosen, every = select(log, signals, topics), stride(log, rate)
     if not chosen:
@@ -146,5 +167,6 @@ WRITERS: dict[str, Callable[[Log, BinaryIO, list[Signal], int, Progress], None]]
     ".parquet": _parquet,
     ".npz": _npz,
     ".mat": _mat,
+    ".rrd": rerun.write,
 }
 """By the ending of the file. A line registers each."""

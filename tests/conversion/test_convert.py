@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from mjspace.conversion.convert import convert
 from mjspace.errors import InputError
 from mjspace.log.columns import select, stride
-from mjspace.log.convert import convert
 from mjspace.log.reader import Log
 from mjspace.runner.run import run
 
