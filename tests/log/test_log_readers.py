@@ -288,7 +288,7 @@ def test_the_examples_on_the_page_run(
 ) -> None:
     page = Path(__file__).parents[2] / "docs" / "log.md"
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
-    _, ours, plain = blocks  # the first flies: tests/test_docs.py runs it
+    ours, _, plain = blocks  # the second is for a notebook: tests/test_docs.py runs it
     monkeypatch.chdir(flown.parent)
     exec(ours, {})
     assert f"{sum(BLOCKS)} 0.0 0.167 True" in capsys.readouterr().out
