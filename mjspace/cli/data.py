@@ -10,7 +10,7 @@ import typer
 
 from mjspace.cli.campaigns import compare_campaigns
 from mjspace.errors import InputError, input_error_at
-from mjspace.terminal.options import Json, LogFile
+from mjspace.terminal.options import Json, LogFile, Quiet
 from mjspace.terminal.reporting import open_log, progress_bar
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def convert(
     rate: Annotated[
         float | None, typer.Option(help="Rows a second; all of the log's when left out.")
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Write a log's signals as a table or arrays for other tools."""
     from mjspace.log.convert import convert as to_file
@@ -59,6 +60,7 @@ def compare(
         typer.Option("-o", "--output", help="Plot what differs most, one over the other: x.png."),
     ] = None,
     as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Compare two logs, signal by signal, at the instants that both have.
 
