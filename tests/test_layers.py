@@ -54,7 +54,7 @@ ROOMS = {
     "runner": "contract errors interrupts log reporting scenario signals simulation units vehicle",
     "campaign": "contract errors interrupts log reporting runner scenario simulation units",
     "dm_env": "attitude contract environment errors scenario simulation",
-    "terminal": "compiling errors log",
+    "terminal": "compiling errors log scenario",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
     "cli": (
         "campaign compiling errors log plotting rendering runner scenario simulation terminal "

@@ -37,7 +37,6 @@ from mjspace.terminal.reporting import compile_bar, report_errors
 app = typer.Typer(
     invoke_without_command=True,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help, in half the time
 )

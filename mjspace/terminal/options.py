@@ -19,7 +19,17 @@ def _obey_quiet(context: typer.Context, quiet: bool) -> bool:
     return quiet
 
 
-Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A name or a TOML file.")]
+def _names(incomplete: str) -> list[str]:
+    """Return the scenarios whose names begin so, for a shell's completion."""
+    from mjspace.scenario.files import scenario_names
+
+    return [name for name in scenario_names() if name.startswith(incomplete)]
+
+
+Scenario = Annotated[
+    str,
+    typer.Argument(metavar="SCENARIO", help="A name or a TOML file.", autocompletion=_names),
+]
 Set = Annotated[
     list[str],
     typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario; repeatable."),

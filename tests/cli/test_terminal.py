@@ -3,6 +3,9 @@
 import io
 import itertools
 import json
+import os
+import subprocess
+import sys
 from contextlib import redirect_stderr
 from pathlib import Path
 
@@ -108,3 +111,11 @@ def test_quiet_prints_nothing_and_the_status_tells(tmp_path: Path) -> None:
 def test_quiet_leaves_the_json(tmp_path: Path, both: list[str]) -> None:
     done = CliRunner().invoke(app, [*SHORT, str(tmp_path), *both])
     assert json.loads(done.stdout)["passed"]
+
+
+def test_a_shell_completes_the_names_of_scenarios() -> None:
+    words = {"COMP_WORDS": "mjspace run wheel-p", "COMP_CWORD": "2"}
+    command = Path(sys.executable).with_name("mjspace")
+    asked = os.environ | words | {"_MJSPACE_COMPLETE": "complete_bash"}
+    done = subprocess.run([command], env=asked, capture_output=True, text=True)
+    assert done.stdout.split() == ["wheel-pyramid", "wheel-pyramid-least-squares"], done.stderr
