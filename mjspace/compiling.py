@@ -20,8 +20,14 @@ _PATIENCE = 1.0
 
 @contextmanager
 def say_so(what: str, _functions: int) -> Iterator[Callable[[int], None]]:
-    """Say in one line that ``what`` is compiled; not in a process that another one started."""
+    """Say in one line that ``what`` is compiled."""
     _say(telling(what))
+    yield lambda done: None
+
+
+@contextmanager
+def say_nothing(_what: str, _functions: int) -> Iterator[Callable[[int], None]]:
+    """Say nothing."""
     yield lambda done: None
 
 
@@ -31,7 +37,7 @@ def telling(what: str) -> str:
 
 
 watch: ContextVar[Watch] = ContextVar("watch", default=say_so)
-"""How users are told."""
+"""How users are told; a process that is started to fly takes over what its parent has."""
 
 
 @contextmanager
@@ -102,7 +108,7 @@ def _locked(folder: Path, what: str) -> Iterator[None]:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 break
             except BlockingIOError:
-                if what and time.monotonic() > due:
+                if what and time.monotonic() > due and parent_process() is None:
                     _say(f"another process compiles {what}, for all: waiting for it")
                     due = float("inf")
                 time.sleep(_LOOK)
@@ -114,5 +120,4 @@ def _locked(folder: Path, what: str) -> Iterator[None]:
 
 
 def _say(line: str) -> None:
-    if parent_process() is None:
-        print(f"mjspace: {line}", file=sys.stderr)
+    print(f"mjspace: {line}", file=sys.stderr)

@@ -51,7 +51,10 @@ ROOMS = {
         "actuators algebra attitude compiling contract environment errors interrupts log ranges "
         "scenario sensors signals tracing units vehicle"
     ),
-    "runner": "contract errors interrupts log reporting scenario signals simulation units vehicle",
+    "runner": (
+        "compiling contract errors interrupts log reporting scenario signals simulation units "
+        "vehicle"
+    ),
     "campaign": "contract errors interrupts log reporting runner scenario simulation units",
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "compiling errors log scenario",

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from mjspace import compiling
 from mjspace.terminal.reporting import silent
 
 
@@ -14,6 +15,8 @@ def _obey_quiet(context: typer.Context, quiet: bool) -> bool:
     """Let nothing but errors and warnings appear, or with ``--json``, which is read first, that."""
     as_json = context.params.get("as_json", False)
     silent.set(quiet or as_json)
+    if quiet or as_json:
+        compiling.watch.set(compiling.say_nothing)
     if quiet and not as_json:
         context.with_resource(redirect_stdout(StringIO()))
     return quiet

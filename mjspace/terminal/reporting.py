@@ -98,9 +98,6 @@ def frame_bar() -> Iterator[Callable[[int, int], None]]:
 @contextmanager
 def compile_bar(what: str, functions: int) -> Iterator[Callable[[int], None]]:
     """Say that ``what`` is compiled, with a bar of ``functions``: a ``compiling.Watch``."""
-    if silent.get():
-        yield lambda done: None
-        return
     with _bar(
         functions, "compiling", "{n}/{total} functions [{remaining} left]", at_once=True
     ) as bar:
