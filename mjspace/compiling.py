@@ -31,6 +31,16 @@ def say_nothing(_what: str, _functions: int) -> Iterator[Callable[[int], None]]:
     yield lambda done: None
 
 
+def nowhere_to_keep(error: BaseException) -> str:
+    """Return what to do where ``error`` is that numba can keep code nowhere; "" for any other."""
+    if "no locator available" not in str(error):
+        return ""
+    return (
+        "what is compiled can be kept neither beside mjspace nor in a cache of yours: let the "
+        "environment variable NUMBA_CACHE_DIR name a folder that can be written"
+    )
+
+
 def telling(what: str) -> str:
     """Return how users are told that ``what`` is compiled."""
     return f"compiling {what} for this machine, once"

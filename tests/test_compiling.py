@@ -13,6 +13,7 @@ import pytest
 
 from mjspace import compiling
 from mjspace.compiling import first_use
+from mjspace.terminal.reporting import report_errors
 
 
 @pytest.fixture
@@ -72,6 +73,20 @@ def test_who_waits_for_another_process_says_so(
     assert capsys.readouterr().err == (
         "mjspace: another process compiles a sum, for all: waiting for it\n"
     )
+
+
+def test_where_nothing_can_be_kept_one_line_says_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from numba.core import caching
+
+    monkeypatch.setattr(caching.CacheImpl, "_locator_classes", [])
+    with pytest.raises(SystemExit) as ended, report_errors():
+        numba.njit(cache=True)(lambda x: x)
+    assert ended.value.code == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("mjspace: what is compiled can be kept neither")
+    assert "NUMBA_CACHE_DIR" in line
 
 
 @pytest.mark.long  # everything is compiled anew, in a minute

@@ -180,7 +180,8 @@ def report_errors() -> Iterator[None]:
         status = _status(error)
         if status is None:
             raise
-        print(f"mjspace: {shortened(str(error), 1500)}", file=sys.stderr)
+        line = compiling.nowhere_to_keep(error) or shortened(str(error), 1500)
+        print(f"mjspace: {line}", file=sys.stderr)
         sys.exit(status)
 
 
@@ -190,5 +191,7 @@ def _status(error: Exception) -> int | None:
     if isinstance(error, InputError):
         return 2
     if isinstance(error, FlightError | NoRendererError | OSError):
+        return 1
+    if compiling.nowhere_to_keep(error):
         return 1
     return None
