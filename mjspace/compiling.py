@@ -118,7 +118,8 @@ def _locked(folder: Path, what: str) -> Iterator[None]:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 break
             except BlockingIOError:
-                if what and time.monotonic() > due and parent_process() is None:
+                is_heard = parent_process() is None and watch.get() is not say_nothing
+                if what and is_heard and time.monotonic() > due:
                     _say(f"another process compiles {what}, for all: waiting for it")
                     due = float("inf")
                 time.sleep(_LOOK)

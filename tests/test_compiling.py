@@ -54,7 +54,10 @@ def test_nobody_is_told_where_nothing_is_compiled(told: list[Any]) -> None:
 
 
 def test_who_waits_for_another_process_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    told: list[Any],
 ) -> None:
     monkeypatch.setattr(compiling, "_PATIENCE", 0.0)
     ready, file = tmp_path / "ready", str(tmp_path / "x.py")
@@ -70,6 +73,7 @@ def test_who_waits_for_another_process_says_so(
             pass
         with first_use(file, "a sum", 1):
             other.wait(1.0)  # it has let go of the lock, which is why this one has it
+    assert told == []
     assert capsys.readouterr().err == (
         "mjspace: another process compiles a sum, for all: waiting for it\n"
     )

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from contextlib import redirect_stderr
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from mjspace import compiling
 from mjspace.cli import app
 from mjspace.runner.live import figures
 from mjspace.runner.run import fly_to_log
@@ -32,11 +34,15 @@ class Terminal(io.StringIO):
 
 
 @pytest.fixture(autouse=True)
-def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Show bars at once, 100 columns wide."""
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Show bars at once, 100 columns wide; what a command changes of that is undone."""
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.setattr(reporting, "DELAY", 0.0)
     monkeypatch.setattr("tqdm.tqdm.monitor_interval", 0)  # a thread that would outlive the test
+    shown, told = reporting.silent.set(False), compiling.watch.set(compiling.say_so)
+    yield
+    reporting.silent.reset(shown)
+    compiling.watch.reset(told)
 
 
 def test_a_flight_shows_time_speed_and_how_the_vehicle_does(
