@@ -32,6 +32,14 @@ class NoRendererError(RuntimeError):
     """Nothing can be rendered on this machine; what to install."""
 
 
+def missing(purpose: str, package: str, extra: str) -> InputError:
+    """Return the error where a ``package`` that only some need is not installed.
+
+    ``extra`` is what of ``pyproject.toml``'s optional dependencies installs it.
+    """
+    return InputError(f"{purpose} needs {package}: pip install 'mjspace[{extra}]'")
+
+
 @contextmanager
 def input_error_at(key: str) -> Iterator[None]:
     """Turn a ValueError or an OSError of the block into an InputError that names ``key``."""

@@ -26,7 +26,8 @@ A_PLANNER_MAY_IMPORT = {"minimum_time": "casadi"}
 # The rooms of the testbed, from the ground up: what each may import, besides those that it names
 # here by a line above its own. A room is a package or a single module of mjspace.
 ROOMS = {
-    "gufunc": "",
+    "compiling": "",
+    "gufunc": "compiling",
     "interrupts": "",
     "errors": "interrupts",
     "ranges": "",
@@ -39,7 +40,7 @@ ROOMS = {
     "scenario": "contract errors ranges units",
     "tracing": "gufunc",
     "vehicle": "contract errors scenario",
-    "environment": "contract errors gufunc scenario vehicle",
+    "environment": "compiling contract errors gufunc scenario vehicle",
     "sensors": "algebra attitude contract errors gufunc scenario units",
     "actuators": ("contract environment errors gufunc scenario sensors signals units vehicle"),
     "log": "attitude contract errors scenario signals units",
@@ -47,21 +48,21 @@ ROOMS = {
     "rendering": "attitude contract environment errors log scenario vehicle",
     "reporting": "contract errors log plotting rendering scenario",
     "simulation": (
-        "actuators algebra attitude contract environment errors interrupts log ranges scenario "
-        "sensors signals tracing units vehicle"
+        "actuators algebra attitude compiling contract environment errors interrupts log ranges "
+        "scenario sensors signals tracing units vehicle"
     ),
     "runner": (
-        "contract errors interrupts log plotting rendering reporting scenario signals simulation "
-        "units vehicle"
+        "compiling contract errors interrupts log plotting rendering reporting scenario signals "
+        "simulation units vehicle"
     ),
     "campaign": "contract errors interrupts log reporting runner scenario simulation units",
     "dm_env": "attitude contract environment errors scenario simulation",
-    "terminal": "errors log",
+    "terminal": "compiling errors log scenario",
     "conversion": "attitude contract errors log plotting rendering",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
     "cli": (
-        "campaign conversion errors log plotting rendering runner scenario simulation terminal "
-        "validation"
+        "campaign compiling conversion errors log plotting rendering runner scenario simulation "
+        "terminal validation"
     ),
     "__main__": "cli interrupts",
 }

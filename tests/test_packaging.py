@@ -1,10 +1,12 @@
 """What is built from this repository installs elsewhere, under one name, and flies."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 from pathlib import Path
 from zipfile import ZipFile
@@ -49,6 +51,13 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_wheel_holds_every_file_of_the_package_and_nothing_else(wheel: Path) -> None:
     with ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
+    # Pictures beside a model show it to a reader; those that it is drawn with are in parts/.
+    previews = {
+        f"mjspace/assets/{path.relative_to(ROOT / 'assets')}"
+        for path in (ROOT / "assets").glob("*/*.png")
+        if path.parent.name != "parts"
+    }
+    assert len(previews) >= 3
     wanted = {
         f"{package}/{path.relative_to(ROOT / folder).as_posix()}"
         for folder, package in MAPPED.items()
@@ -56,8 +65,41 @@ def test_wheel_holds_every_file_of_the_package_and_nothing_else(wheel: Path) -> 
         if path.is_file() and "__pycache__" not in path.parts
         # A script beside a model made its pictures; it is no part of the package.
         if path.suffix != ".py" or path.with_name("__init__.py").exists()
-    }
+    } - previews
     assert held == wanted
+
+
+def extras() -> dict[str, list[str]]:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    return dict(project["optional-dependencies"])
+
+
+def test_all_is_every_extra_but_that_of_developers() -> None:
+    (everything,) = extras()["all"]
+    assert everything == f"mjspace[{','.join(sorted(extras().keys() - {'all', 'dev'}))}]"
+
+
+def test_what_an_error_tells_to_install_is_an_extra() -> None:
+    files = [*ROOT.glob("mjspace/**/*.py"), *ROOT.glob("controllers/**/*.py")]
+    code = "".join(path.read_text() for path in files)
+    named = re.findall(r'missing\(.*, "(\w+)"\)', code) + re.findall(r"mjspace\[(\w+)\]", code)
+    assert {"data", "dm", "planning", "search"} <= set(named) <= extras().keys()
+
+
+@pytest.mark.parametrize(
+    ("package", "what", "line"),
+    [
+        ("pyarrow", "from mjspace.log.arrow import pyarrow_for; pyarrow_for('x.parquet')",
+         "x.parquet needs pyarrow: pip install 'mjspace[data]'"),
+        ("dm_control", "import mjspace.dm_env",
+         "mjspace.dm_env needs dm_control, which exists up to Python 3.12: "
+         "pip install 'mjspace[dm]'"),
+    ],
+)  # fmt: skip
+def test_one_line_says_what_is_missing(package: str, what: str, line: str) -> None:
+    code = f"import sys; sys.modules[{package!r}] = None\n{what}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stderr.splitlines()[-1].partition(": ")[2] == line
 
 
 @pytest.mark.slow  # nothing is compiled yet where the wheel has just been installed

@@ -80,7 +80,7 @@ def _casadi() -> Any:
         import casadi
     except ImportError:
         raise ModuleNotFoundError(
-            "minimum_time_slew needs CasADi: pip install mjspace[planning]"
+            "minimum_time_slew needs CasADi: pip install 'mjspace[planning]'"
         ) from None
     return casadi
 

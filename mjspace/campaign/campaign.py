@@ -15,7 +15,7 @@ from mjspace.errors import InputError
 from mjspace.interrupts import on_signals
 from mjspace.runner import workers
 from mjspace.runner.output import refuse_existing
-from mjspace.runner.run import Progress, Result, fly_to_log, output_folder
+from mjspace.runner.run import Progress, Result, fly_to_log, output_folder, telling_time
 
 TOGETHER = 32
 """Members in a batch, and in a file."""
@@ -108,7 +108,7 @@ def fly_one(
     path = log_of(out, member)
     refuse_existing(path, force=force)
     assembly, _ = population(campaign).member(member)
-    return fly_to_log(assembly, path, member=member, force=force, progress=progress)
+    return fly_to_log(assembly, path, member=member, force=force, watch=telling_time(progress))
 
 
 def _parts(missing: Sequence[int], size: int) -> list[list[int]]:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from mjspace.contract import Array
-from mjspace.errors import InputError
+from mjspace.errors import missing
 
 EXPLORED = 16
 """Points of a Sobol sequence before each descent, which begins at the best of all of them."""
@@ -71,7 +71,7 @@ def _descent(start: Array, seed: int) -> Any:
             warnings.simplefilter("ignore")
             import cma
     except ImportError:
-        raise InputError("a search needs cma: pip install 'mjspace[search]'") from None
+        raise missing("a search", "cma", "search") from None
     size = 4 + int(3.0 * np.log(max(len(start), 2)))
     options = {"bounds": [0.0, 1.0], "seed": seed, "popsize": size + size % 2, "verbose": -9}
     with warnings.catch_warnings():

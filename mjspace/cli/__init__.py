@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from mjspace import __version__
+from mjspace import __version__, compiling
 from mjspace.cli import (
     campaigns,
     data,
@@ -32,12 +32,11 @@ from mjspace.cli import (
 )
 from mjspace.errors import print_warning
 from mjspace.rendering import graphics
-from mjspace.terminal.reporting import report_errors
+from mjspace.terminal.reporting import compile_bar, report_errors
 
 app = typer.Typer(
     invoke_without_command=True,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help, in half the time
 )
@@ -79,6 +78,7 @@ app.command()(validation.validate)
 def main() -> None:
     """Run the command line; the entry point."""
     warnings.showwarning = print_warning
+    compiling.watch.set(compile_bar)
     for stream in (sys.stdout, sys.stderr):  # whatever the terminal's encoding
         stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     with report_errors():

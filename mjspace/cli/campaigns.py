@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mjspace.errors import InputError, printable
-from mjspace.terminal.options import Force, Json, Scenario, Set, Traceback, Trust, Workers
+from mjspace.terminal.options import Force, Json, Quiet, Scenario, Set, Traceback, Trust, Workers
 from mjspace.terminal.reporting import cause_shown, count_bar, progress_bar
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ def campaign(
     ] = False,
     force: Force = False,
     as_json: Json = False,
+    quiet: Quiet = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:

@@ -10,7 +10,7 @@ import typer
 
 from mjspace.cli.campaigns import compare_campaigns
 from mjspace.errors import InputError, input_error_at, whole_or_none
-from mjspace.terminal.options import Json, LogFile
+from mjspace.terminal.options import Json, LogFile, Quiet
 from mjspace.terminal.reporting import open_log, progress_bar
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ def convert(
         str | None,
         typer.Option(metavar="CAMERA", help="In x.mcap, also the pictures of this camera: chase."),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Write a log for other tools: a table, arrays, or for viewers.
 
@@ -89,6 +90,7 @@ def compare(
         typer.Option("-o", "--output", help="Plot what differs most, one over the other: x.png."),
     ] = None,
     as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Compare two logs, signal by signal, at the instants that both have.
 

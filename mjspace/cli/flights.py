@@ -14,6 +14,7 @@ from mjspace.terminal.options import (
     LogFile,
     Out,
     Plot,
+    Quiet,
     Report,
     Scenario,
     Set,
@@ -21,7 +22,14 @@ from mjspace.terminal.options import (
     Trust,
     Video,
 )
-from mjspace.terminal.reporting import cause_shown, open_log, print_cause, progress_bar
+from mjspace.terminal.reporting import (
+    cause_shown,
+    flight_bar,
+    frame_bar,
+    open_log,
+    print_cause,
+    progress_bar,
+)
 
 if TYPE_CHECKING:
     from mjspace.runner.run import Result
@@ -49,10 +57,12 @@ def run(
     video: Video = False,
     report_it: Report = False,
     as_json: Json = False,
+    quiet: Quiet = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
     """Fly a scenario, log it and judge it."""
+    from mjspace.runner.live import figures
     from mjspace.runner.output import LOG
     from mjspace.runner.run import fly_to_log, output_folder
     from mjspace.scenario.loading import load
@@ -69,9 +79,14 @@ def run(
     with cause_shown(traceback):
         loaded, folder = load(scenario, [*overrides, *extra])
         assembly = assemble(loaded, folder, trust=trust)
-        with progress_bar(loaded.duration, "flying") as progress:
+        with flight_bar(loaded.duration) as show:
             path = output_folder(out, loaded.name) / LOG
-            result = fly_to_log(assembly, path, force=force, progress=progress)
+            result = fly_to_log(
+                assembly,
+                path,
+                force=force,
+                watch=lambda block: show(float(block.time[-1]), figures(assembly, block)),
+            )
     pictures = Pictures(plot_it, video, report_it)
     _finish(result, pictures, as_json, traceback)
 
@@ -115,6 +130,7 @@ def replay(
     video: Video = False,
     report_it: Report = False,
     as_json: Json = False,
+    quiet: Quiet = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
@@ -171,7 +187,7 @@ def _finish(result: "Result", made: Pictures, as_json: bool, traceback: bool) ->
         from mjspace.rendering.render import render as to_video
 
         pictures["video"] = result.path.with_suffix(".mp4")
-        with progress_bar(result.log.end, "rendering") as progress:
+        with frame_bar() as progress:
             to_video(result.path, pictures["video"], progress=progress)
     if made.report:
         from mjspace.runner.flight_report import write as to_report

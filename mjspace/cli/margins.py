@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mjspace.errors import InputError, input_error_at
-from mjspace.terminal.options import Json, Scenario, Set, Traceback, Trust, Workers
+from mjspace.terminal.options import Json, Quiet, Scenario, Set, Traceback, Trust, Workers
 from mjspace.terminal.reporting import cause_shown, count_bar
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def margins(
     ] = None,
     workers: Workers = None,
     as_json: Json = False,
+    quiet: Quiet = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from mjspace.errors import InputError, input_error_at
-from mjspace.terminal.options import LogFile
-from mjspace.terminal.reporting import open_log, progress_bar
+from mjspace.terminal.options import LogFile, Quiet
+from mjspace.terminal.reporting import frame_bar, open_log
 
 
 def render(
@@ -18,6 +18,7 @@ def render(
     rate: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds for each second.")] = 1.0,
     at: Annotated[float | None, typer.Option(help="Time of a still [s]; else the end.")] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Render a log to a video or a picture, offscreen."""
     from mjspace.rendering.render import render as to_picture
@@ -25,9 +26,10 @@ def render(
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit()):
         raise InputError(f"--size {size}: write width and height in pixels, as in 960x540")
-    with progress_bar(open_log(log).end, "rendering") as progress, input_error_at("render"):
+    opened = open_log(log)
+    with frame_bar() as progress, input_error_at("render"):
         to_picture(
-            log,
+            opened,
             output,
             camera=camera,
             size=(int(width), int(height)),
@@ -54,6 +56,7 @@ def plot(
         tuple[str, str] | None,
         typer.Option(metavar="X Y", help="Plot a phase plane: one signal against another."),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Plot a log to a page: what matters of what flew, or the signals that are named."""
     from mjspace.log.columns import select

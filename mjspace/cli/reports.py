@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from mjspace.errors import InputError, input_error_at
-from mjspace.terminal.reporting import open_log, progress_bar
+from mjspace.terminal.options import Quiet
+from mjspace.terminal.reporting import frame_bar, open_log
 
 
 def report(
@@ -22,6 +23,7 @@ def report(
     video: Annotated[
         bool, typer.Option("--video", help="Also the video of each log, if it is small.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write a report of a log, of several side by side, or of a campaign, as one HTML file."""
     from mjspace.campaign.results import DESCRIPTION
@@ -36,8 +38,7 @@ def report(
         campaign(logs[0], output)
         return
     opened = [open_log(log) for log in logs]
-    end = max(log.end for log in opened)
-    with progress_bar(end, "rendering") as progress, input_error_at("report"):
+    with frame_bar() as progress, input_error_at("report"):
         write(opened, output, signals=signals, video=video, progress=progress)
     print(output)
 

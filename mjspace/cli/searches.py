@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from mjspace.errors import InputError, printable
-from mjspace.terminal.options import Json, Scenario, Set, Traceback, Trust, Workers
+from mjspace.terminal.options import Json, Quiet, Scenario, Set, Traceback, Trust, Workers
 from mjspace.terminal.reporting import cause_shown, count_bar
 
 
@@ -31,6 +31,7 @@ def falsify(
     ] = None,
     workers: Workers = None,
     as_json: Json = False,
+    quiet: Quiet = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:
@@ -145,6 +146,7 @@ def tune(
     ] = None,
     workers: Workers = None,
     as_json: Json = False,
+    quiet: Quiet = False,
     trust: Trust = False,
     traceback: Traceback = False,
 ) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from mjspace.errors import InputError, input_error_at
-from mjspace.terminal.options import Json
+from mjspace.terminal.options import Json, Quiet
 from mjspace.terminal.reporting import progress_bar
 
 
@@ -31,6 +31,7 @@ def validate(
         ),
     ] = None,
     as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Measure MuJoCo's physics against closed forms; or the physics of a model of yours."""
     if model is not None:

@@ -12,7 +12,7 @@ from mjspace.contract import Array
 from mjspace.conversion.arrows import Arrows, arrows_of
 from mjspace.conversion.rerun_layout import FOLLOW, WORLD, blueprint
 from mjspace.conversion.shown import Frames, bus_of, extent, frames_of, shapes_of
-from mjspace.errors import InputError
+from mjspace.errors import missing
 from mjspace.log.columns import Signal, blocks
 from mjspace.log.reader import Log
 from mjspace.plotting.style import COLORS
@@ -63,7 +63,7 @@ def rerun_for(purpose: str) -> Any:
         import rerun
         import rerun.blueprint
     except ImportError:
-        raise InputError(f"{purpose} needs rerun-sdk: pip install 'mjspace[rerun]'") from None
+        raise missing(purpose, "rerun-sdk", "rerun") from None
     return rerun
 
 

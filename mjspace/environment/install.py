@@ -11,6 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjspace.compiling import first_use
 from mjspace.contract import Array
 from mjspace.environment import joints, kernel, struct_offsets
 from mjspace.environment.base import HEADER, MAGIC, Term
@@ -22,6 +23,7 @@ SENSOR = "environment"
 """Name of the user sensor (6 numbers, needstage "vel") that reports the environment's total on the
 vehicle: force [N] in world axes, torque [N m] about its centre of mass in the bus's body axes."""
 
+_FUNCTIONS = 77  # that numba compiles for the callbacks, counted with numba 0.68
 _NO_PASSIVE = int(mujoco.mjtDisableBit.mjDSBL_SPRING | mujoco.mjtDisableBit.mjDSBL_DAMPER)
 
 
@@ -40,7 +42,8 @@ def install_callbacks() -> None:
 def _callbacks() -> tuple[Any, Any]:
     offsets = struct_offsets.find()
     version = kernel.version_of_terms()
-    return kernel.passive_callback(*offsets, version), kernel.sensor_callback(*offsets)
+    with first_use(kernel.__file__, "the environment", _FUNCTIONS):
+        return kernel.passive_callback(*offsets, version), kernel.sensor_callback(*offsets)
 
 
 def userdata_size(environment: Environment, plant: PlantTable | None = None) -> int:

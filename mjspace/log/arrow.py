@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mjspace.errors import InputError
+from mjspace.errors import missing
 
 
 def pyarrow_for(purpose: str) -> Any:
@@ -15,5 +15,5 @@ def pyarrow_for(purpose: str) -> Any:
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise InputError(f"{purpose} needs pyarrow: pip install 'mjspace[data]'") from None
+        raise missing(purpose, "pyarrow", "data") from None
     return pyarrow

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mjspace.errors import InputError
+from mjspace.errors import missing
 from mjspace.log.columns import select
 from mjspace.log.reader import Log
 
@@ -29,7 +29,7 @@ def frame(
     try:
         import pandas
     except ImportError:
-        raise InputError("a table needs pandas: pip install 'mjspace[data]'") from None
+        raise missing("a table", "pandas", "data") from None
     topic = topic if topic.startswith("/") else f"/{topic}"
     rows = log.read(topic, fields, start, end, every)
     prefix = f"{topic.removeprefix('/')}."

@@ -36,14 +36,14 @@ def render(
     rate: float = 25.0,
     speed: float = 1.0,
     at: float | None = None,
-    progress: Callable[[float], None] = lambda time: None,
+    progress: Callable[[int, int], None] = lambda drawn, count: None,
 ) -> None:
     """Draw a log: a video where ``output`` ends in .mp4, a still where it ends in .png.
 
     A video has ``rate`` frames per second and shows ``speed`` simulated seconds per second, from
     the first instant of the log to the last (to within a frame). A still shows the time ``at`` [s],
-    by default the end. ``size`` is (width, height) in pixels; ``progress`` is called with the time
-    of each frame [s].
+    by default the end. ``size`` is (width, height) in pixels; ``progress`` is called
+    after each frame of a video with how many are drawn, and of how many.
 
     Raises:
         ValueError: an unknown file ending or camera, an odd size of a video, a rate or speed that
@@ -77,9 +77,9 @@ def render(
     count = int((log.end - log.start) / period + 1e-9) + 1
     times = np.linspace(log.start, log.start + period * (count - 1), count)
     with Video(output, size, rate) as video:
-        for time, frame in zip(times, frames_at(log, times, camera, size), strict=True):
+        for drawn, frame in enumerate(frames_at(log, times, camera, size), 1):
             video.write(frame)
-            progress(float(time))
+            progress(drawn, count)
 
 
 def nearest_rows(log: Log, topic: str, field: str, times: Array) -> Iterator[Array]:

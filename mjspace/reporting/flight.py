@@ -55,7 +55,7 @@ def write(
     *,
     signals: Sequence[str] = (),
     video: bool = False,
-    progress: Callable[[float], None] = lambda time: None,
+    progress: Callable[[int, int], None] = lambda drawn, count: None,
 ) -> None:
     """Write the report of one flight, or a comparison of several, as one HTML file.
 

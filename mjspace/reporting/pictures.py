@@ -40,7 +40,7 @@ def still(log: Log) -> Picture:
     return Picture(_address("image/webp", small.getvalue()), f"at {log.end:g} s")
 
 
-def video(log: Log, progress: Callable[[float], None]) -> Picture:
+def video(log: Log, progress: Callable[[int, int], None]) -> Picture:
     """Return the log as a video of at most 20 s, if it is at most ``LARGEST_VIDEO``."""
     speed = max(1.0, (log.end - log.start) / _SHOWN)
     with TemporaryDirectory() as folder:

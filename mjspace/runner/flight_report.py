@@ -23,7 +23,7 @@ def write(
     *,
     signals: Sequence[str] = (),
     video: bool = False,
-    progress: Callable[[float], None] = lambda time: None,
+    progress: Callable[[int, int], None] = lambda drawn, count: None,
 ) -> None:
     """Write the report of a log, or a comparison of several, to one HTML file.
 

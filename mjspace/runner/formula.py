@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from mjspace.contract import Array
-from mjspace.errors import InputError, nearest
+from mjspace.errors import missing, nearest
 from mjspace.scenario.scenario import Check
 from mjspace.signals import Topics, find_signal
 from mjspace.units import UNITS, Quantity, to_si
@@ -102,9 +102,7 @@ def _tree(written: str, atoms: int, text: str) -> Any:
     try:
         import rtamt
     except ImportError:
-        raise InputError(
-            "a formula needs rtamt, for Python 3.12 or earlier: pip install 'mjspace[logic]'"
-        ) from None
+        raise missing("a formula", "rtamt, for Python 3.12 or earlier", "logic") from None
     specification = rtamt.StlDiscreteTimeOfflineSpecification()
     for number in range(atoms):
         specification.declare_var(f"atom{number}", "float")

@@ -19,7 +19,7 @@ from mjspace.log.writer import nanoseconds
 from mjspace.runner.former_names import as_logged, logged_name
 from mjspace.runner.logged_assembly import assembly_of
 from mjspace.runner.output import LOG, refuse_existing
-from mjspace.runner.run import Progress, Result, fly_to_log
+from mjspace.runner.run import Progress, Result, fly_to_log, telling_time
 from mjspace.scenario.loading import component
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.trust import is_address
@@ -92,7 +92,12 @@ def replay(
     with assembly_of(log, law, folder, trust=trust) as assembly:
         begin = start_of(log, assembly, start, fresh_law=law is not None)
         return fly_to_log(
-            assembly, path, member=log.member, start=begin, force=force, progress=progress
+            assembly,
+            path,
+            member=log.member,
+            start=begin,
+            force=force,
+            watch=telling_time(progress),
         )
 
 

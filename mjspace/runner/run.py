@@ -27,6 +27,8 @@ from mjspace.simulation.recording import Block, shapes
 
 Progress = Callable[[float], None]
 """A function that is called with the simulated time reached [s]."""
+Watch = Callable[[Block], None]
+"""A function that is called with each block as it is flown; it must not change it."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,12 @@ def run(
     loaded, folder = load(scenario, overrides)
     assembly = assemble(loaded, folder, trust=trust)
     path = output_folder(out, loaded.name) / LOG
-    return fly_to_log(assembly, path, force=force, progress=progress)
+    return fly_to_log(assembly, path, force=force, watch=telling_time(progress))
+
+
+def telling_time(progress: Progress) -> Watch:
+    """Return what calls ``progress`` with the time that a block reaches."""
+    return lambda block: progress(float(block.time[-1]))
 
 
 def output_folder(out: str | Path | None, name: str, last: str = "") -> Path:
@@ -105,9 +112,11 @@ def fly_to_log(
     member: int = 0,
     start: Start | None = None,
     force: bool = False,
-    progress: Progress = lambda time: None,
+    watch: Watch = lambda block: None,
 ) -> Result:
     """Fly one member of the scenario, from ``start`` or time zero, into a new log, and judge it.
+
+    ``watch`` is called with each block that has been handed over to the log.
 
     Raises:
         InputError: a check or a metric names no signal of this flight, or has a bound of
@@ -132,7 +141,7 @@ def fly_to_log(
         try:
             for block in chain([first], blocks):
                 recorder.write(block)
-                progress(float(block.time[-1]))
+                watch(block)
         except FlightError as error:
             trouble, ended_by = str(error), error
         except Interrupted as error:

@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection
 from threading import Event, Thread
 from typing import Any, TypeVar
 
-from mjspace import interrupts
+from mjspace import compiling, interrupts
 from mjspace.errors import FlightError, print_warning
 from mjspace.interrupts import Interrupted, Stop
 
@@ -80,7 +80,8 @@ def team(
     warm_up(module)
     theirs, ours = _CONTEXT.Pipe(duplex=False)
     cores = processes or os.cpu_count() or 1
-    with ours, ProcessPoolExecutor(cores, _CONTEXT, _begin, (theirs,)) as pool:
+    arguments = (theirs, compiling.watch.get())
+    with ours, ProcessPoolExecutor(cores, _CONTEXT, _begin, arguments) as pool:
         try:
             yield partial(_made, pool, ours, stop)
         finally:
@@ -133,12 +134,13 @@ def _break_off(number: int, _frame: Any) -> None:
     raise Interrupted(number)
 
 
-def _begin(parents: Connection) -> None:
+def _begin(parents: Connection, watch: compiling.Watch) -> None:
     """Begin as a worker, which ends when the ``parents`` end of the pipe is closed."""
     from mjspace.simulation import mujoco_warnings  # here: this module must not cost what it saves
 
     mujoco_warnings.silence()
     warnings.showwarning = print_warning
+    compiling.watch.set(watch)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     _idle.set()
     Thread(target=_end_with, args=(parents,), daemon=True).start()

@@ -111,6 +111,9 @@ class PlantTable(Table):
     gyrostat_inertia: Matrix3 | None = None
     """The papers' H: the whole vehicle about its centre of mass less the wheels' axial inertia; the
     bus inertia follows from it."""
+    impossible_inertia: Switch = False
+    """Whether it is on purpose that no mass distribution has the bus's inertia, as that of a paper:
+    it is flown all the same, then without a warning."""
     vehicle_mass: Annotated[Positive, Si("kg")] | None = None
     """Mass of the whole vehicle, with all that is on it; the bus's follows, not ``mass``."""
     vehicle_inertia: Matrix3 | None = None

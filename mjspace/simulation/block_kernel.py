@@ -13,6 +13,7 @@ import numpy as np
 from numba import cfunc, from_dtype, njit, types
 from numba.np.numpy_support import carray
 
+from mjspace.compiling import first_use
 from mjspace.environment import native_memory
 from mjspace.environment.native_memory import pointer
 from mjspace.simulation import burning_kernel, mujoco_calls
@@ -73,6 +74,7 @@ ORDERS = np.dtype([
 ])  # fmt: skip
 """What is flown; places in a memory are offsets [bytes], sizes are in bytes."""
 _ORDERS = from_dtype(ORDERS)
+_FUNCTIONS = 60  # that numba compiles for a block, counted with numba 0.68
 _MOST_WORDS = 1 << 20
 """More than mjData has: only words that the tables name are read."""
 
@@ -263,7 +265,8 @@ def block_function() -> Any:
     modules = native_memory, replay, mujoco_calls, burning_kernel
     content = b"".join(Path(str(module.__file__)).read_bytes() for module in modules)
     digest = hashlib.sha256(content).digest()
-    return _compiled(int.from_bytes(digest[:7]) | 1)
+    with first_use(__file__, "the loop of a flight", _FUNCTIONS):
+        return _compiled(int.from_bytes(digest[:7]) | 1)
 
 
 def _compiled(version: int) -> Any:

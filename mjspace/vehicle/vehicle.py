@@ -88,7 +88,8 @@ def build(
             ``model_checks.check``.
 
     Warns:
-        UnphysicalInertiaWarning: the bus inertia violates the triangle inequality; flown unchanged.
+        UnphysicalInertiaWarning: the bus inertia violates the triangle inequality, and it is not
+            said that this is meant; flown unchanged.
     """
     spec, own, relative = composition.compose(table, source)
     spec.option.timestep = rates.physics
@@ -105,11 +106,11 @@ def build(
         bodies = inertials(spec.compile())
         others = [each for name, each in bodies.items() if name != composition.bus_of(spec).name]
         inertial = mass_properties.remainder(table.vehicle_mass, whole, others)
-        model = _compile(spec, inertial)
+        model = _compile(spec, inertial, meant=table.impossible_inertia)
     else:
         stated = mass_properties.own_inertia(composition.bus_of(spec))
         inertial, gyrostat = mass_properties.bus(table, rotors, stated)
-        model = _compile(spec, inertial)
+        model = _compile(spec, inertial, meant=table.impossible_inertia)
     model_checks.check(model)
     driven = Driven.together([own.driven, *driven_by(model, table, own.driven).values()])
     where = indices.of(model, driven)
@@ -253,7 +254,7 @@ def driven_by(model: Any, table: PlantTable, own: Driven) -> dict[str, Driven]:
     return found
 
 
-def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
+def _compile(spec: Any, inertial: mass_properties.Inertial, *, meant: bool) -> Any:
     body, moments = composition.bus_of(spec), inertial.inertia
     body.mass, body.ipos, _, body.iquat = inertial
     body.fullinertia = np.full(6, np.nan)  # unset: the principal moments hold
@@ -262,13 +263,14 @@ def _compile(spec: Any, inertial: mass_properties.Inertial) -> Any:
     body.inertia = moments if excess <= 0.0 else np.full(3, moments.mean())
     model = spec.compile()
     if excess > 0.0:
-        eigenvalues = np.array2string(moments, precision=4)
-        warnings.warn(
-            f"no mass distribution has the bus inertia's eigenvalues {eigenvalues} kg m^2: the "
-            f"largest exceeds the sum of the others by {excess:.4g}; flown unchanged",
-            UnphysicalInertiaWarning,
-            stacklevel=3,
-        )
+        if not meant:
+            eigenvalues = np.array2string(moments, precision=4)
+            warnings.warn(
+                f"no mass distribution has the bus inertia's eigenvalues {eigenvalues} kg m^2: the "
+                f"largest exceeds the sum of the others by {excess:.4g}; flown unchanged",
+                UnphysicalInertiaWarning,
+                stacklevel=3,
+            )
         model.body(body.name).inertia = moments
         mujoco.mj_setConst(model, mujoco.MjData(model))
     return model

@@ -32,3 +32,16 @@ def test_a_scenario_is_shown_without_the_compiler_and_without_parts_that_it_has_
     assert not {"matplotlib", "mcap", "numba", "scipy"} & found
     assert "mjspace.actuators.reaction_wheels" in found
     assert not {"mjspace.actuators.thrusters", "mjspace.environment.orbit"} & found
+
+
+def test_a_shell_completes_a_scenario_without_anything_that_computes() -> None:
+    found = imported_by(
+        "import os\n"
+        "os.environ |= {'_MJSPACE_COMPLETE': 'complete_bash', 'COMP_CWORD': '2',\n"
+        "               'COMP_WORDS': 'mjspace run wheel-p'}\n"
+        "from mjspace.cli import app\n"
+        "try: app(prog_name='mjspace')\n"
+        "except SystemExit: pass\n"
+    )
+    assert "mjspace.scenario.files" in found
+    assert not HEAVY & found

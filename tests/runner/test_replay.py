@@ -34,11 +34,6 @@ from mjspace.simulation.assembly import assemble
 from mjspace.simulation.initial_state import first_start
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import Block, Rows, shapes
-from mjspace.vehicle.vehicle import UnphysicalInertiaWarning
-
-pytestmark = pytest.mark.filterwarnings(
-    f"ignore::{UnphysicalInertiaWarning.__module__}.UnphysicalInertiaWarning"
-)
 
 NOISY = (
     "duration=0.4",
@@ -79,8 +74,7 @@ class Damper:
 
 @pytest.fixture(scope="module")
 def noisy(tmp_path_factory: pytest.TempPathFactory) -> Result:
-    with pytest.warns(UnphysicalInertiaWarning):
-        return run("contraction-adaptive", overrides=NOISY, out=tmp_path_factory.mktemp("noisy"))
+    return run("contraction-adaptive", overrides=NOISY, out=tmp_path_factory.mktemp("noisy"))
 
 
 def test_the_same_flight_again_is_the_same_bit_for_bit(noisy: Result) -> None:
@@ -184,10 +178,7 @@ EVERYTHING = (
 
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory) -> Result:
-    with pytest.warns(UnphysicalInertiaWarning):
-        result = run(
-            "contraction-adaptive", overrides=EVERYTHING, out=tmp_path_factory.mktemp("all")
-        )
+    result = run("contraction-adaptive", overrides=EVERYTHING, out=tmp_path_factory.mktemp("all"))
     kinds = {field.partition("_")[0] for field in result.log.topics["/state"]}
     assert kinds == {"physics", "law", "sensor", "actuator"}
     return result

@@ -14,8 +14,6 @@ from mjspace.runner.run import Result, run
 from mjspace.scenario.files import scenario_names
 from mjspace.scenario.loading import load
 
-pytestmark = pytest.mark.filterwarnings("ignore::mjspace.vehicle.vehicle.UnphysicalInertiaWarning")
-
 LONG = 100_000  # integration steps: a quarter of a minute, on a busy machine half of one
 FLAGSHIPS = {"dgvscmg-tracking", "lander"}  # flown whole however long
 

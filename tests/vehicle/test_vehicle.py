@@ -83,6 +83,8 @@ def test_inertia_from_the_bus_is_what_mujoco_flies(root: Array, axes: Any) -> No
 def test_paper_matrix_flies_as_printed_and_says_so() -> None:
     with pytest.warns(plant.UnphysicalInertiaWarning, match=r"5\.6586 11\.8982 27\.2932.*9\.736"):
         vehicle = build(gyrostat_inertia=PAPER)
+    meant = build(gyrostat_inertia=PAPER, impossible_inertia=True)  # or the warning is an error
+    np.testing.assert_array_equal(meant.model.body_inertia, vehicle.model.body_inertia)
     block = mass_matrix(vehicle.model)[3:6, 3:6]
     # H0 = H + Jw 1, equations/attitude.md section 4; measured 1e-14.
     np.testing.assert_allclose(block, np.array(PAPER) + 0.05 * np.eye(3), rtol=0.0, atol=1e-13)
