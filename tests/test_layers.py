@@ -52,7 +52,9 @@ ROOMS = {
     ),
     "runner": "contract errors interrupts log reporting scenario signals simulation units vehicle",
     "campaign": "contract errors interrupts log reporting runner scenario simulation units",
-    "dm_env": "attitude contract environment errors scenario simulation",
+    "learning": "attitude contract errors scenario signals simulation",
+    "dm_env": "contract environment learning scenario simulation",
+    "gym": "campaign contract errors learning rendering scenario simulation",
     "terminal": "errors log",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
     "cli": "campaign errors log plotting rendering runner scenario simulation terminal validation",
@@ -60,10 +62,13 @@ ROOMS = {
 }
 # Outside packages that a few rooms alone may know.
 ONLY_IN = {
-    "mujoco": "vehicle environment actuators simulation log rendering dm_env runner validation",
+    "mujoco": (
+        "vehicle environment actuators simulation log rendering dm_env gym runner validation"
+    ),
     "mcap": "log",
     "dm_control": "dm_env",
     "dm_env": "dm_env",
+    "gymnasium": "gym",
     "mjspace.controllers": "",  # a scenario names its law, and the loader imports it
 }
 

@@ -151,11 +151,23 @@ def population(campaign: Campaign, *, alike: bool = False) -> Population:
         InputError: bad input, in one line; unless they may be ``alike``, that they would be.
     """
     table, path, origins = read(campaign.scenario, campaign.all_overrides)
-    scenario = validated(table, str(path), origins)
-    nominal = assemble(scenario, path.parent, trust=campaign.trust)
-    differ = scenario.dispersions or scenario.faults or nominal.sensors([0]).ticks
+    found = population_of(campaign, table, path, origins)
+    differ = found.dispersions or found.scenario.faults or found.nominal.sensors([0]).ticks
     if not (differ or alike):
         raise InputError(f"{path}: dispersions: none, and no noise: every member would be alike")
+    return found
+
+
+def population_of(
+    campaign: Campaign, table: Mapping[str, Any], path: Path, origins: Mapping[str, str]
+) -> Population:
+    """Return the members of the campaign whose scenario is in the ``table``, as it was ``read``.
+
+    Raises:
+        InputError: bad input, in one line.
+    """
+    scenario = validated(dict(table), str(path), origins)
+    nominal = assemble(scenario, path.parent, trust=campaign.trust)
     found = Population(campaign, table, path, origins, nominal)
     for number, dispersion in enumerate(scenario.dispersions):
         with input_error_at(f"{path}: dispersions.{number}.key"):

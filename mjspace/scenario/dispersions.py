@@ -22,7 +22,7 @@ REQUIRED = {
 OPTIONAL = {"normal": ("mean",), "triangular": ("mode",)}
 """What it may be given: the scenario's own value when left out."""
 _PARAMETERS = ("mean", "std", "low", "high", "mode", "values", "radius")
-_NOT_FLOWN = ("checks", "dispersions", "events", "log", "sampling", "seed")
+_NOT_FLOWN = ("checks", "dispersions", "events", "log", "sampling", "seed", "task")
 _Number = Annotated[Finite, AnyUnit]
 
 

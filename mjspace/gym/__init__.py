@@ -1,0 +1,11 @@
+"""The scenarios as Gymnasium environments: ``mjspace.gym.load(scenario)``."""
+
+try:
+    import gymnasium  # noqa: F401 - the modules below would say it less clearly
+except ModuleNotFoundError:
+    raise ImportError("mjspace.gym needs gymnasium: pip install 'mjspace[gym]'") from None
+
+from mjspace.gym.environment import load
+from mjspace.gym.vector import load_vector
+
+__all__ = ["load", "load_vector"]
