@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from mjspace.campaign import draws
 from mjspace.errors import FlightError, InputError, input_error_at, nearest
 from mjspace.scenario.construct import plain
 from mjspace.scenario.dispersions import Dispersion, refuse_mode_outside
 from mjspace.scenario.loading import read, to_toml, validated
+from mjspace.scenario.plant import Initial
 from mjspace.scenario.scenario import Scenario
-from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.assembly import Assembly, assemble, starting_at
 
 STATE = {
     "initial.position": ("qpos", slice(0, 3)),
@@ -125,17 +127,43 @@ class Population:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the scenario's own have been shown
-                scenario = validated(table, str(self.path), self.origins)
-                vehicle = self._same_vehicle(scenario)
-                assembly = assemble(
-                    scenario, self.path.parent, trust=self.campaign.trust, vehicle=vehicle
-                )
+                assembly = self._elsewhere(table) or self._assembled(table)
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
-        written = plain(assembly.scenario.model_dump(mode="python"))
+        flown = assembly.scenario
+        parts = {each.path[0] for each in self.dispersions}
+        written = plain(flown.model_dump(mode="python", include=parts))
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
             require_arrival(assembly, written, dispersion, value, name)
         return assembly
+
+    @cached_property
+    def _undispersed(self) -> Scenario:
+        """The scenario without draws and without dispersions, as flown."""
+        return self.scenario.model_copy(update={"dispersions": []})
+
+    def _elsewhere(self, table: Mapping[str, Any]) -> Assembly | None:
+        """Return the nominal assembly with another start, in a tenth of the time of a new one.
+
+        None where the members differ in more than their start, or this one cannot start so.
+        """
+        if any(each.path[0] != "initial" for each in self.dispersions):
+            return None
+        try:
+            initial = Initial.model_validate(table["initial"])
+        except ValidationError:
+            return None
+        still = replace(self.nominal, scenario=self._undispersed)
+        return starting_at(still, initial)
+
+    def _assembled(self, table: dict[str, Any]) -> Assembly:
+        scenario = validated(table, str(self.path), self.origins)
+        return assemble(
+            scenario,
+            self.path.parent,
+            trust=self.campaign.trust,
+            vehicle=self._same_vehicle(scenario),
+        )
 
     def _same_vehicle(self, scenario: Scenario) -> Any:
         """Return the nominal vehicle; None if that of the ``scenario`` is another."""

@@ -60,8 +60,7 @@ class Episodes:
         self.action, self.last = Action(self.nominal), last_period(self.nominal.scenario)
         self._threads = threads
         self.desired = Desired(self.nominal)
-        (first,) = self.begin([0])
-        signals = first.signals()
+        signals = self._side_by_side([(0, self.nominal)]).signals()
         self.task = Task(self.nominal.scenario, path.parent, signals, trust=trust)
         observed = self.task.observation(signals).items()
         self.labels = [f"{name}[{i}]" for name, a in observed for i in range(rows(a).shape[1])]

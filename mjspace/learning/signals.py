@@ -95,10 +95,9 @@ class Signals:
 
     def _error(self, name: str) -> Array:
         measurement, desired = self.period.measurement, self.desired
-        relative = attitude.multiply(attitude.conjugate(desired.attitude), measurement.attitude)
-        if name == "attitude":
-            return attitude.to_rotation_vector(relative)
-        return measurement.rate - attitude.rotate(attitude.conjugate(relative), desired.rate)
+        rate = measurement.rate if hasattr(measurement, "rate") else np.zeros(3)
+        errors = attitude.tracking_error(measurement.attitude, rate, desired.attitude, desired.rate)
+        return errors[_ERRORS.index(name)]
 
 
 _ERRORS = "attitude", "rate"  # the second needs the first as well
