@@ -105,7 +105,7 @@ def test_a_member_that_starts_elsewhere_is_as_one_that_is_assembled(
         "dispersions=[{key='initial.rate',distribution='on_sphere',radius=0.1},"
         "{key='initial.attitude',distribution='random_attitude'}]"
     )
-    for scenario in ("detumble-wheels", "rcs-schmitt"):
+    for scenario in ("detumble-wheels", "learned-slew"):
         members = population(Campaign(scenario, (drawn,), 3))
         quick, _ = members.member(1)
         with monkeypatch.context() as patch:
