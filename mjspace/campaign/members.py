@@ -61,6 +61,8 @@ class Population:
     origins: Mapping[str, str]
     """The option that set each overridden key."""
     nominal: Assembly
+    nominal_is_of_table: bool = True
+    """Whether nothing but draws has changed since the nominal one was assembled."""
 
     @property
     def scenario(self) -> Scenario:
@@ -93,7 +95,7 @@ class Population:
         table = copy.deepcopy(dict(self.table))
         for path, value in values.items():
             put(table, self.written, path, value)
-        return replace(self, table=table)
+        return replace(self, table=table, nominal_is_of_table=False)
 
     def drawn(self, members: Sequence[int]) -> list[list[Any]]:
         """Return the value of each dispersion of each of the members."""
@@ -147,7 +149,9 @@ class Population:
 
         None where the members differ in more than their start, or this one cannot start so.
         """
-        if any(each.path[0] != "initial" for each in self.dispersions):
+        if not self.nominal_is_of_table or {each.path[0] for each in self.dispersions} != {
+            "initial"
+        }:
             return None
         try:
             initial = Initial.model_validate(table["initial"])

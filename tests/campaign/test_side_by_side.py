@@ -115,3 +115,6 @@ def test_a_member_that_starts_elsewhere_is_as_one_that_is_assembled(
         assert alike(quick, whole)
         assert quick.qpos.tobytes() == whole.qpos.tobytes() != members.nominal.qpos.tobytes()
         assert quick.qvel.tobytes() == whole.qvel.tobytes() != members.nominal.qvel.tobytes()
+    # Another gain is not forgotten.
+    tuned, _ = members.with_values({("rates", "control"): 0.1}).member(1)
+    assert tuned.scenario.rates.control == 0.1
