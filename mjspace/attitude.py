@@ -129,6 +129,16 @@ def rotation_angle(q: Array, p: Array) -> Array:
     return angle
 
 
+def tracking_error(q: Array, w: Array, q_ref: Array, w_ref: Array) -> tuple[Array, Array]:
+    """Return (rotation vector [rad], rate [rad/s]) of a motion from the desired one, (..., 3) each.
+
+    The vector is that of the shorter turn from the desired attitude ``q_ref`` to ``q``, the rate
+    ``w`` less the desired one; ``w_ref`` is in the desired axes, all else in body axes.
+    """
+    turned = multiply(conjugate(q_ref), q)
+    return to_rotation_vector(turned), w - rotate(conjugate(turned), w_ref)
+
+
 def to_mrp(q: Array) -> Array:
     """Return the modified Rodrigues parameters q_v / (1 + q_0), shape (..., 3).
 

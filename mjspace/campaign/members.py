@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from mjspace.campaign import draws
 from mjspace.errors import FlightError, InputError, input_error_at, nearest
 from mjspace.scenario.construct import plain
 from mjspace.scenario.dispersions import Dispersion, path_of, refuse_mode_outside
 from mjspace.scenario.loading import read, to_toml, validated
+from mjspace.scenario.plant import Initial
 from mjspace.scenario.scenario import Scenario
-from mjspace.simulation.assembly import Assembly, assemble
+from mjspace.simulation.assembly import Assembly, assemble, starting_at
 
 STATE = {
     "initial.position": ("qpos", slice(0, 3)),
@@ -59,6 +61,8 @@ class Population:
     origins: Mapping[str, str]
     """The option that set each overridden key."""
     nominal: Assembly
+    nominal_is_of_table: bool = True
+    """Whether nothing but draws has changed since the nominal one was assembled."""
 
     @property
     def scenario(self) -> Scenario:
@@ -95,7 +99,7 @@ class Population:
         table = copy.deepcopy(dict(self.table))
         for path, value in values.items():
             put(table, self.written, path, value)
-        return replace(self, table=table)
+        return replace(self, table=table, nominal_is_of_table=False)
 
     def drawn(self, members: Sequence[int]) -> list[list[Any]]:
         """Return the value of each dispersion of each of the members."""
@@ -130,18 +134,48 @@ class Population:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the scenario's own have been shown
-                scenario = validated(table, str(self.path), self.origins)
-                vehicle = self._same_vehicle(scenario)
-                assembly = assemble(
-                    scenario, self.path.parent, trust=self.campaign.trust, vehicle=vehicle
-                )
+                assembly = self._elsewhere(table) or self._assembled(table)
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
-        written = plain(assembly.scenario.model_dump(mode="python"))
+        flown = assembly.scenario
+        written = plain(flown.model_dump(mode="python", include=self._dispersed))
         for dispersion, value in zip(self.dispersions, drawn, strict=True):
             for key, part in dispersion.by_key(value).items():
                 require_arrival(assembly, written, dispersion, key, part, name)
         return assembly
+
+    @cached_property
+    def _dispersed(self) -> set[str]:
+        """The tables of the scenario in which members differ."""
+        return {path[0] for each in self.dispersions for path in each.paths}
+
+    @cached_property
+    def _undispersed(self) -> Scenario:
+        """The scenario without draws and without dispersions, as flown."""
+        return self.scenario.model_copy(update={"dispersions": []})
+
+    def _elsewhere(self, table: Mapping[str, Any]) -> Assembly | None:
+        """Return the nominal assembly with another start, in a tenth of the time of a new one.
+
+        None where the members differ in more than their start, or this one cannot start so.
+        """
+        if not self.nominal_is_of_table or self._dispersed != {"initial"}:
+            return None
+        try:
+            initial = Initial.model_validate(table["initial"])
+        except ValidationError:
+            return None
+        still = replace(self.nominal, scenario=self._undispersed)
+        return starting_at(still, initial)
+
+    def _assembled(self, table: dict[str, Any]) -> Assembly:
+        scenario = validated(table, str(self.path), self.origins)
+        return assemble(
+            scenario,
+            self.path.parent,
+            trust=self.campaign.trust,
+            vehicle=self._same_vehicle(scenario),
+        )
 
     def _same_vehicle(self, scenario: Scenario) -> Any:
         """Return the nominal vehicle; None if that of the ``scenario`` is another."""
@@ -157,11 +191,23 @@ def population(campaign: Campaign, *, alike: bool = False) -> Population:
         InputError: bad input, in one line; unless they may be ``alike``, that they would be.
     """
     table, path, origins = read(campaign.scenario, campaign.all_overrides)
-    scenario = validated(table, str(path), origins)
-    nominal = assemble(scenario, path.parent, trust=campaign.trust)
-    differ = scenario.dispersions or scenario.faults or nominal.sensors([0]).ticks
+    found = population_of(campaign, table, path, origins)
+    differ = found.dispersions or found.scenario.faults or found.nominal.sensors([0]).ticks
     if not (differ or alike):
         raise InputError(f"{path}: dispersions: none, and no noise: every member would be alike")
+    return found
+
+
+def population_of(
+    campaign: Campaign, table: Mapping[str, Any], path: Path, origins: Mapping[str, str]
+) -> Population:
+    """Return the members of the campaign whose scenario is in the ``table``, as it was ``read``.
+
+    Raises:
+        InputError: bad input, in one line.
+    """
+    scenario = validated(dict(table), str(path), origins)
+    nominal = assemble(scenario, path.parent, trust=campaign.trust)
     found = Population(campaign, table, path, origins, nominal)
     for number, dispersion in enumerate(scenario.dispersions):
         with input_error_at(f"{path}: dispersions.{number}.{'keys' if dispersion.keys else 'key'}"):

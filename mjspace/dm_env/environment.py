@@ -5,33 +5,30 @@ MuJoCo's warnings go to its log.
 """
 
 import copy
-import math
 from collections import OrderedDict
 from collections.abc import Iterable
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+from dm_env.specs import BoundedArray
 from mujoco.batch import MODEL_FIELDS
 
-from mjspace import attitude
-from mjspace.contract import Array, DesiredMotion, Event, Measurement
+from mjspace.contract import Array, Event, Measurement
 from mjspace.dm_env import bridge
-from mjspace.dm_env.action import Action
 from mjspace.environment.install import install_callbacks
-from mjspace.errors import InputError
+from mjspace.learning.action import Action
+from mjspace.learning.desired import Desired
+from mjspace.learning.no_law import refuse_what_needs_a_law
+from mjspace.learning.signals import Signals
+from mjspace.learning.task import Task
 from mjspace.scenario import loading
+from mjspace.scenario.scenario import Scenario
 from mjspace.simulation.assembly import Assembly, without_law
 from mjspace.simulation.control_period import ControlPeriod
 from mjspace.simulation.initial_state import INTEGRATION, initial_physics, last_period, start_at
-from mjspace.simulation.loop import BLOCK_PERIODS
 from mjspace.simulation.stepper import Stepper
-from mjspace.simulation.user_code import reference_at
-
-TOLERATED_ERROR = np.radians(1.0)
-"""Attitude error [rad] that earns the full reward where no check of the scenario bounds it."""
 
 
 def load(scenario: str | Path, overrides: Iterable[str] = (), *, trust: bool = False) -> Any:
@@ -48,15 +45,10 @@ def load(scenario: str | Path, overrides: Iterable[str] = (), *, trust: bool = F
         InputError: bad input, in one line.
     """
     loaded, folder = loading.load(scenario, overrides)
-    for number, fault in enumerate(loaded.faults):
-        signal = "" if fault.when is None else fault.when.signal
-        if signal.removeprefix("/").startswith(("law.", "estimate.")):
-            raise InputError(
-                f"faults.{number}.when.signal: {signal}: an environment flies no law: give a "
-                "signal of truth, measurement or command"
-            )
-    assembly = without_law(loaded, folder, trust=trust)
-    return bridge.Environment(Physics(assembly), Tracking(assembly), n_sub_steps=loaded.rates.steps)
+    refuse_what_needs_a_law(loaded)
+    physics = Physics(without_law(loaded, folder, trust=trust))
+    task = Task(loaded, folder, physics.signals(), trust=trust)
+    return bridge.Environment(physics, Tracking(loaded, task), n_sub_steps=loaded.rates.steps)
 
 
 class Physics(bridge.Physics):  # type: ignore[misc]
@@ -74,6 +66,7 @@ class Physics(bridge.Physics):  # type: ignore[misc]
         self._assembly = assembly
         self._initial = initial_physics(assembly, 1)[0]
         self._steps = assembly.scenario.rates.steps
+        self._desired, self.action = Desired(assembly), Action(assembly)
         self._changed: set[str] = set()
         # The masses of this copy change as propellant burns.
         super().__init__(bridge.MjData(bridge.MjModel(copy.copy(assembly.vehicle.model))))
@@ -95,6 +88,7 @@ class Physics(bridge.Physics):  # type: ignore[misc]
             self._stepper = Stepper(self._assembly, start_at(self._assembly, state[None], [0]))
         self._command: Any = None
         self._events: list[Event] = []
+        self._flown = self.action.command(np.zeros((1, len(self.action.labels))))
         self._sense(0)
 
     def command(self, command: Any) -> None:
@@ -120,7 +114,7 @@ class Physics(bridge.Physics):  # type: ignore[misc]
         with np.errstate(all="ignore"):
             self._stepper.begin(self._period)
             self._stepper.finish(self._period)
-        self._events = self._period.events
+        self._events, self._flown = self._period.events, self._command
         self._sense(self._period.number + 1)
 
     def period(self) -> int:
@@ -143,6 +137,11 @@ class Physics(bridge.Physics):  # type: ignore[misc]
     def events(self) -> list[Event]:
         """Return what happened in the last control period, such as a fault that began."""
         return list(self._events)
+
+    def signals(self) -> Signals:
+        """Return what a task may observe and reward, with a vehicle axis."""
+        desired = self._desired.at(self._period.number)
+        return Signals(self._stepper.layout, self._period, desired, self._flown)
 
     def momentum(self) -> Array:
         """Return the total angular momentum about the centre of mass, inertial [N m s], (3,)."""
@@ -171,29 +170,10 @@ class Physics(bridge.Physics):  # type: ignore[misc]
 
 
 class Tracking(bridge.Task):  # type: ignore[misc]
-    """Follow the scenario's reference, as closely as its checks ask, until its duration is over."""
+    """The scenario's task, until its duration is over."""
 
-    def __init__(self, assembly: Assembly) -> None:
-        scenario = assembly.scenario
-        self._action = Action(assembly)
-        self._control, self._last = scenario.rates.control, last_period(scenario)
-        self._bounds = [
-            (check.start, math.inf if check.end is None else check.end, check.below)
-            for check in scenario.checks
-            if check.signal.removeprefix("/").removesuffix("[0]") == "truth.attitude_error"
-            and check.statistic in ("max", "peak")
-            and check.target is None
-            and check.below
-        ]
-
-        @lru_cache(maxsize=1)
-        def block(number: int) -> DesiredMotion:
-            first = number * BLOCK_PERIODS
-            end = min(first + BLOCK_PERIODS, self._last + 1)
-            times = np.arange(first, end, dtype=np.float64) * self._control
-            return reference_at(assembly.reference, times)
-
-        self._block = block
+    def __init__(self, scenario: Scenario, task: Task) -> None:
+        self._task, self._last = task, last_period(scenario)
 
     def initialize_episode(self, physics: Physics) -> None:
         """Change nothing: the physics has been reset to the scenario's start."""
@@ -206,46 +186,35 @@ class Tracking(bridge.Task):  # type: ignore[misc]
         bounded by an angular acceleration of 100 rad/s^2 of the largest principal inertia; others
         without a limit are infinite. Each actuator enforces its own limits, the spec none.
         """
-        return self._action.spec()
+        action = physics.action
+        name = "\t".join(action.labels)
+        return BoundedArray(action.least.shape, np.float64, action.least, action.largest, name)
 
     def before_step(self, action: Array, physics: Physics) -> None:
         """Command the actuators with ``action`` for one control period."""
-        physics.command(self._action.command(action))
+        physics.command(physics.action.command(np.asarray(action)[None]))
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, Array]:
-        """Return the measurement, and the reference as the desired motion."""
-        named = {
-            **physics.measurement()._asdict(),
-            **{f"reference_{k}": v for k, v in self._reference(physics)._asdict().items()},
-        }
-        # Without its sensor, a field is empty.
-        return OrderedDict((name, np.array(v)) for name, v in named.items() if v.size)
+        """Return what the scenario's task observes: by default measurement and reference."""
+        observed = self._task.observation(physics.signals())
+        return OrderedDict((name, np.array(rows[0])) for name, rows in observed.items())
 
     def get_reward(self, physics: Physics) -> float:
-        """Return bound / (true attitude error), at most 1; 0 where the state is not finite.
-
-        The bound is the tightest ``below`` of the checks that bound the error at this instant
-        (statistic max or peak of truth.attitude_error), or ``TOLERATED_ERROR`` where none does.
-        """
-        if physics.diverged():
-            return 0.0
-        now = physics.period() * self._control
-        active = [below for start, end, below in self._bounds if start <= now <= end]
-        bound = min(active, default=TOLERATED_ERROR)
-        reference = self._reference(physics)
-        error = attitude.rotation_angle(physics.truth().attitude, reference.attitude)
-        return float(bound / max(error, bound))
+        """Return the reward of the scenario's task; 0 where the state is not finite."""
+        reward, _ = self._judged(physics)
+        return reward
 
     def get_termination(self, physics: Physics) -> float | None:
-        """Return the last discount: 0 where the state is not finite, 1 at the scenario's end."""
-        if physics.diverged():
+        """Return the last discount: 0 where the task ends the episode, 1 at the scenario's end."""
+        _, ends = self._judged(physics)
+        if ends:
             return 0.0
         return 1.0 if physics.period() >= self._last else None
 
-    def _reference(self, physics: Physics) -> DesiredMotion:
-        number, row = divmod(physics.period(), BLOCK_PERIODS)
-        block = self._block(number)
-        return type(block)(*(values[row] for values in block))
+    def _judged(self, physics: Physics) -> tuple[float, bool]:
+        diverged = np.array([physics.diverged()])
+        reward, ends = self._task.judged(physics.signals(), diverged)
+        return float(reward[0]), bool(ends[0])
 
 
 def _field(model: Any, name: str) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mjspace.errors import failure, nearest, shortened
 from mjspace.ranges import numbers, refuse_unfit
-from mjspace.scenario.gain_tables import columns
+from mjspace.scenario.gain_tables import gains_in
 from mjspace.scenario.scenario import Component
 from mjspace.scenario.trust import Trust
 from mjspace.units import quantity_in, to_si
@@ -24,9 +24,9 @@ def construct(
     A parameter that the table leaves out is taken from ``facts`` where they hold its name (the
     vehicle's properties), else from its default; the component as flown has all written out, but
     for facts that are objects, as the ephemeris is.
-    ``file`` gives the rows of a table read from a CSV file with a header of parameter names. A
-    table in a gain that has a ``kind`` is constructed in the same way, and so is one for a
-    parameter that is annotated with a dataclass, or a list of it.
+    ``file`` gives the rows of a table read from a CSV file with a header of parameter names, or
+    the arrays of an .npz. A table in a gain that has a ``kind`` is constructed in the same way, and
+    so is one for a parameter that is annotated with a dataclass, or a list of it.
 
     Raises:
         ValueError: an unknown, missing or unfit gain, with its name and what would be right.
@@ -36,7 +36,7 @@ def construct(
         file = gains.pop("file")
         if not isinstance(file, str):
             raise ValueError(f"file: got {shortened(repr(file))}, should be text")
-        read = columns(trust.file(file))
+        read = gains_in(trust.file(file))
         if both := sorted(read.keys() & gains.keys()):
             raise ValueError(f"{both[0]}: stands both here and in the file: leave one out")
         gains |= read

@@ -25,7 +25,7 @@ OPTIONAL = {"normal": ("mean",), "triangular": ("mode",)}
 _PARAMETERS = ("mean", "std", "low", "high", "mode", "values", "radius")
 ROUNDING = 1e-12
 """Of a correlation, by which an eigenvalue may be below zero."""
-_NOT_FLOWN = ("checks", "dispersions", "events", "log", "sampling", "seed")
+_NOT_FLOWN = ("checks", "dispersions", "events", "log", "sampling", "seed", "task")
 _Number = Annotated[Finite, AnyUnit]
 
 

@@ -22,6 +22,7 @@ from mjspace.scenario.metrics import Metric
 from mjspace.scenario.plant import Initial, PlantTable, Rates
 from mjspace.scenario.region import Region
 from mjspace.scenario.sensors import Sensors, check_sensors
+from mjspace.scenario.task import Task
 from mjspace.units import whole_number
 
 _MOST_STEPS = 100_000  # in a control period: seconds of wall time
@@ -152,6 +153,8 @@ class Scenario(Table):
     metrics: Annotated[list[Metric], Field(exclude_if=operator.not_)] = []
     events: list[EventTable] = []
     log: LogRates = LogRates()
+    task: Task | None = None
+    """Of an environment for reinforcement learning; every other command leaves it aside."""
     dispersions: list[Dispersion] = []
     """What differs from member to member of ``mjspace campaign``; every other command flies the
     scenario as it stands."""

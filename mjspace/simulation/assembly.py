@@ -10,7 +10,6 @@ import numpy as np
 
 from mjspace.actuators import faults, model_motors
 from mjspace.actuators.actuator_set import ActuatorSet
-from mjspace.actuators.base import Context
 from mjspace.actuators.faults import FaultSet
 from mjspace.contract import Array, Law, ReferenceSource
 from mjspace.environment.constants import RADIUS
@@ -22,16 +21,18 @@ from mjspace.environment.solar_pressure import shadow_radii
 from mjspace.errors import InputError, input_error_at
 from mjspace.scenario.construct import construct
 from mjspace.scenario.on_reference import on_reference
+from mjspace.scenario.plant import Initial
 from mjspace.scenario.scenario import Component, Scenario
 from mjspace.scenario.trust import Trust, is_address, is_library
 from mjspace.sensors.base import OwnSensor, Surroundings
 from mjspace.sensors.suite import SensorSuite
+from mjspace.simulation import start
 from mjspace.simulation.estimated_law import EstimatedLaw, refuse_inner_loop
 from mjspace.simulation.known_beforehand import Known, known_of, seen_of
 from mjspace.simulation.sources import in_log, metric_functions
 from mjspace.simulation.unbatched_law import UnbatchedLaw
-from mjspace.vehicle import deployments, ground, ground_contact, other_spacecraft, own_model
-from mjspace.vehicle.vehicle import Vehicle, build, driven_by, initial_state
+from mjspace.vehicle import ground, own_model
+from mjspace.vehicle.vehicle import Vehicle, build
 
 METHODS = {
     "law": ("reset(measurement, reference)", "step(state, time, measurement, reference)"),
@@ -212,11 +213,7 @@ def assemble(
             update={"python": in_log("disturbance", kind, disturbance, sources)}
         )
     metrics, flown["metrics"] = metric_functions(scenario.metrics, own, sources)
-    qpos, qvel = _part("initial", initial_state, vehicle, scenario.initial)
-    deployments.stow(vehicle.model, qpos, scenario.plant.parts)
-    _part("plant", other_spacecraft.set_states, vehicle.model, scenario.plant, qpos, qvel)
-    if scenario.plant.ground is not None:
-        _part("initial.position", ground_contact.refuse_buried, vehicle.model, qpos)
+    qpos, qvel = start.coordinates(vehicle, scenario)
     assembly = Assembly(
         scenario=scenario.model_copy(update=flown),
         vehicle=vehicle,
@@ -230,7 +227,7 @@ def assemble(
             scenario.plant,
         ),
         known=_part("environment", known_of, scenario),
-        actuators=_part("plant", _actuators, vehicle, scenario, inner=inner),
+        actuators=start.actuators(vehicle, scenario, inner=inner),
         reference=reference,
         law=law if getattr(law, "batched", False) else UnbatchedLaw(law),
         inner=inner,
@@ -257,6 +254,19 @@ def without_law(scenario: Scenario, folder: Path, *, trust: bool = False) -> Ass
     return replace(assembly, sources=sources)
 
 
+def starting_at(assembly: Assembly, initial: Initial) -> Assembly:
+    """Return the assembly with another initial state, and with what depends on that.
+
+    Raises:
+        InputError: the vehicle cannot start there.
+    """
+    scenario = assembly.scenario.model_copy(update={"initial": initial})
+    scenario = on_reference(scenario, assembly.reference)
+    qpos, qvel = start.coordinates(assembly.vehicle, scenario)
+    actuators = start.actuators(assembly.vehicle, scenario, inner=assembly.inner)
+    return replace(assembly, scenario=scenario, qpos=qpos, qvel=qvel, actuators=actuators)
+
+
 def under_inner_loop(assembly: Assembly) -> Assembly:
     """Return the assembly with actuators that an inner loop commands in every integration step.
 
@@ -264,7 +274,7 @@ def under_inner_loop(assembly: Assembly) -> Assembly:
         InputError: an actuator cannot be built so.
     """
     scenario = assembly.scenario
-    actuators = _part("plant", _actuators, assembly.vehicle, scenario, inner=True)
+    actuators = start.actuators(assembly.vehicle, scenario, inner=True)
     return replace(assembly, actuators=actuators, inner=True)
 
 
@@ -304,32 +314,6 @@ def _has_inner_loop(law: Any) -> bool:
             "a leading vehicle axis, and set its attribute batched = True"
         )
     return has
-
-
-def _actuators(vehicle: Vehicle, scenario: Scenario, *, inner: bool) -> ActuatorSet:
-    """Return the actuators of all that is fitted to the vehicle, in the order of plant's keys.
-
-    Those of a model of one's own come before.
-    """
-    tables, gravity = scenario.plant.equipment, _gravity_at_start(scenario)
-    kinds = model_motors.actuators_of(vehicle, alone=not any(t.fitted for t in tables.values()))
-    alone = len(tables) == 1 and not kinds
-    driven = driven_by(vehicle.model, scenario.plant, vehicle.own.driven)
-    for key, table in tables.items():
-        with input_error_at(f"plant.{key}"):
-            context = Context(
-                vehicle, driven[key], scenario.rates, scenario.initial, gravity, inner, kinds, alone
-            )
-            kinds += (table.actuator(context),)
-    return ActuatorSet(kinds)
-
-
-def _gravity_at_start(scenario: Scenario) -> float:
-    """Return the central gravity where the vehicle starts [m/s^2]; 0 without."""
-    if (around := scenario.environment.gravity) is None:
-        return 0.0
-    place = np.array(scenario.initial.position, dtype=float)
-    return float(np.linalg.norm(around.acceleration(place)))
 
 
 def _part(key: str, build: Callable[..., Any], *arguments: Any, **named: Any) -> Any:

@@ -225,7 +225,7 @@ def block_of(
             **layout.in_orbit(physics),
             "position": physics[..., layout.position],
             "velocity": physics[..., layout.velocity],
-            **_position_errors(physics[..., layout.position], truth.attitude, desired),
+            **position_errors(physics[..., layout.position], truth.attitude, desired),
             "momentum": data[..., vehicle.momentum],
             "energy": data[..., vehicle.kinetic],
             "attitude_error": attitude.rotation_angle(truth.attitude, desired["attitude"])[
@@ -260,7 +260,7 @@ def block_of(
     return Block(number, time, logged, events + columns.events, kinds)
 
 
-def _position_errors(
+def position_errors(
     position: Array, quaternion: Array, reference: dict[str, Array]
 ) -> dict[str, Array]:
     """Return, where the reference has a position, the error from it [m] and the tilt [rad].

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from mjspace.campaign import flights
-from mjspace.campaign.alike import may_be_alike
+from mjspace.campaign.alike import alike, may_be_alike
 from mjspace.campaign.flights import Call, fly_members
 from mjspace.campaign.members import Campaign, population
 from mjspace.simulation import loop
@@ -96,3 +96,25 @@ def test_members_fly_as_alone(
         alone = flown(what, (member,), monkeypatch)
         assert alone == ([(member,)], {member: rows[member]})
     assert len({state for state, _ in rows.values()}) == 3
+
+
+def test_a_member_that_starts_elsewhere_is_as_one_that_is_assembled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drawn = (
+        "dispersions=[{key='initial.rate',distribution='on_sphere',radius=0.1},"
+        "{key='initial.attitude',distribution='random_attitude'}]"
+    )
+    for scenario in ("detumble-wheels", "learned-slew"):
+        members = population(Campaign(scenario, (drawn,), 3))
+        quick, _ = members.member(1)
+        with monkeypatch.context() as patch:
+            patch.setattr(type(members), "_elsewhere", lambda *_: None)
+            whole, _ = members.member(1)
+        assert quick.scenario == whole.scenario
+        assert alike(quick, whole)
+        assert quick.qpos.tobytes() == whole.qpos.tobytes() != members.nominal.qpos.tobytes()
+        assert quick.qvel.tobytes() == whole.qvel.tobytes() != members.nominal.qvel.tobytes()
+    # Another gain is not forgotten.
+    tuned, _ = members.with_values({("rates", "control"): 0.1}).member(1)
+    assert tuned.scenario.rates.control == 0.1

@@ -401,6 +401,22 @@ def test_an_observation_is_the_agents_own() -> None:
         np.testing.assert_array_equal(values, kept[name])
 
 
+def test_the_task_of_the_scenario_is_observed_and_rewarded() -> None:
+    environment = at_rest(
+        "task.observation=['truth.attitude_error','measurement.rate[1]','error.attitude']",
+        "task.reward=[{signal='command.torque',weight=-2}]",
+        "task.terminate=[{signal='truth.rate',above=1e-9,reward=3}]",
+    )
+    step = environment.reset()
+    assert list(step.observation) == ["truth_attitude_error", "rate[1]", "error_attitude"]
+    angle = step.observation["truth_attitude_error"]
+    np.testing.assert_allclose(angle, np.radians(2.0))
+    np.testing.assert_allclose(step.observation["error_attitude"], [angle[0], 0, 0], atol=1e-12)
+    assert environment.step(np.zeros(3)).reward == 0.0
+    step = environment.step(np.array([3.0, 0.0, 4.0]))
+    assert (step.reward, step.discount, step.last()) == (-10.0 + 3.0, 0.0, True)
+
+
 def test_an_episode_ends_with_the_scenario() -> None:
     environment = dm_env.load("contraction-adaptive", ["duration=0.3", "rates.control=0.1"])
     environment.reset()

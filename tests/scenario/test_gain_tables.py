@@ -1,10 +1,11 @@
-"""Gains from a CSV file: what is read, and which file and line are wrong."""
+"""Gains from a file: what is read, and which file and line are wrong."""
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from mjspace.scenario.gain_tables import columns
+from mjspace.scenario.gain_tables import arrays, columns, gains_in
 
 
 def test_columns_are_grouped_by_their_names(tmp_path: Path) -> None:
@@ -35,3 +36,25 @@ def test_what_is_wrong_is_said_with_file_and_line(tmp_path: Path, text: str, mes
     assert "\n" not in str(refused.value)
     with pytest.raises(ValueError, match=r"gone\.csv cannot be read"):
         columns(tmp_path / "gone.csv")
+
+
+def test_arrays_are_grouped_by_their_names(tmp_path: Path) -> None:
+    file = tmp_path / "net.npz"
+    np.savez(file, w0=np.eye(2), w1=np.ones((1, 2)), b=np.arange(3))
+    assert gains_in(file) == {"w": [[[1.0, 0.0], [0.0, 1.0]], [[1.0, 1.0]]], "b": [0, 1, 2]}
+
+
+def test_what_is_no_file_of_arrays_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "net.npz"
+    with pytest.raises(ValueError, match=r"^file: .*net\.npz cannot be read"):
+        arrays(file)
+    file.write_text("w0,1")
+    with pytest.raises(ValueError, match=r"net\.npz cannot be read"):
+        arrays(file)
+    for bad in (np.array([np.nan]), np.array(["x"]), np.array([object()])):
+        np.savez(file, w=bad)
+        with pytest.raises(ValueError, match=r"net\.npz"):
+            arrays(file)
+    np.savez(file, w1=np.eye(2))
+    with pytest.raises(ValueError, match=r"net\.npz: got \['w1'\], should be \['w0'\]"):
+        arrays(file)

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from dm_env.specs import BoundedArray
 
 from mjspace.contract import Array
 from mjspace.simulation.assembly import Assembly
@@ -16,45 +15,48 @@ LARGEST_ACCELERATION = 100.0
 
 
 class Action:
-    """How a flat array of numbers is the command of one vehicle."""
+    """How flat arrays of numbers are the command of some vehicles.
+
+    Attributes:
+        labels: of each number, with its unit: "torque[0] [N m]".
+        least: what the actuators can apply at the least, (n,); infinite where nothing bounds it.
+        largest: at the most, (n,).
+    """
 
     def __init__(self, assembly: Assembly) -> None:
         """Collect what the actuators of the vehicle take, in their order."""
         self._shapes: dict[str, tuple[int, ...]] = {}
-        self._labels: list[str] = []
-        self._limits: dict[str, tuple[Array, Array]] = {}
+        self.labels: list[str] = []
+        limits: dict[str, tuple[Array, Array]] = {}
         for kind in assembly.actuators.kinds:
             for name, (width, unit) in kind.takes.items():
                 shape = (width,) if isinstance(width, int) else width
                 self._shapes[name] = shape
-                self._labels += [f"{name}{_index(i, shape)} [{unit}]" for i in np.ndindex(shape)]
-                self._limits[name] = _bounded(kind.limits()[name], unit, assembly.vehicle.inertia)
+                self.labels += [f"{name}{_index(i, shape)} [{unit}]" for i in np.ndindex(shape)]
+                limits[name] = _bounded(kind.limits()[name], unit, assembly.vehicle.inertia)
+        self._ends = np.cumsum([math.prod(shape) for shape in self._shapes.values()])
         self._command = _named_tuple(self._shapes)
-
-    def spec(self) -> BoundedArray:
-        """Return shape and bounds; the name has a label with the unit for each number."""
-        least, largest = (
-            np.concatenate([limits[side].ravel() for limits in self._limits.values()])
-            for side in (0, 1)
+        self.least, self.largest = (
+            np.concatenate([each[side].ravel() for each in limits.values()]) for side in (0, 1)
         )
-        return BoundedArray(least.shape, np.float64, least, largest, "\t".join(self._labels))
 
-    def command(self, action: Array) -> Any:
-        """Return the command, a named tuple of arrays (1, ...), of an ``action`` (n,).
+    def command(self, actions: Array) -> Any:
+        """Return the command, a named tuple of arrays (N, ...), of ``actions`` (N, n).
 
         Raises:
-            ValueError: the action has another length.
+            ValueError: the actions have another length.
         """
-        numbers = np.array(action, dtype=float)
-        if numbers.shape != (len(self._labels),):
+        numbers = np.array(actions, dtype=float)
+        if numbers.ndim != 2 or numbers.shape[1] != len(self.labels):
             raise ValueError(
-                f"the action has shape {numbers.shape}: it must be ({len(self._labels)},), of "
-                f"{', '.join(self._labels)}"
+                f"the action has shape {numbers.shape[1:]}: it must be ({len(self.labels)},), of "
+                f"{', '.join(self.labels)}"
             )
-        ends = np.cumsum([math.prod(shape) for shape in self._shapes.values()])
-        parts = np.split(numbers, ends[:-1])
+        parts = np.split(numbers, self._ends[:-1], axis=1)
         shapes = self._shapes.values()
-        return self._command(*(p.reshape(1, *s) for p, s in zip(parts, shapes, strict=True)))
+        return self._command(
+            *(p.reshape(len(numbers), *s) for p, s in zip(parts, shapes, strict=True))
+        )
 
 
 def _bounded(limits: tuple[Array, Array], unit: str, inertia: Array) -> tuple[Array, Array]:

@@ -1,0 +1,1 @@
+"""What environments for reinforcement learning share: actions, observations, rewards, ends."""
