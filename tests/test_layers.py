@@ -55,7 +55,11 @@ ROOMS = {
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
-    "cli": "campaign errors log plotting rendering runner scenario simulation terminal validation",
+    "view": "attitude contract errors log plotting",
+    "cli": (
+        "campaign errors interrupts log plotting rendering runner scenario simulation terminal "
+        "validation view"
+    ),
     "__main__": "cli interrupts",
 }
 # Outside packages that a few rooms alone may know.
