@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mjspace.errors import InputError, input_error_at
-from mjspace.terminal.reporting import open_log
+from mjspace.terminal.reporting import open_log, progress_bar
 
 if TYPE_CHECKING:
     from mjspace.log.reader import Log
@@ -17,18 +17,33 @@ def view(
         str,
         typer.Argument(metavar="LOG|SCENARIO", help="A log to replay, or a scenario to fly live."),
     ],
+    export: Annotated[
+        Path | None, typer.Option(help="Write the replay of a log to this HTML file instead.")
+    ] = None,
     host: Annotated[
         str, typer.Option(help="Address to serve on; but for this machine's own with a token.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 is any that is free.")] = 8080,
 ) -> None:
     """Look at a flight in a browser."""
+    _require_viser()
+    log = open_log(Path(what))
     with input_error_at("view"):
-        _replay(open_log(Path(what)), host, port)
+        if export is not None:
+            _export(log, export)
+        else:
+            _replay(log, host, port)
+
+
+def _export(log: "Log", output: Path) -> None:
+    from mjspace.view.export import export
+
+    with progress_bar(log.end, "recording") as progress:
+        export(log, output, progress=progress)
+    print(output)
 
 
 def _replay(log: "Log", host: str, port: int) -> None:
-    _require_viser()
     from mjspace.interrupts import on_signals
     from mjspace.view.replay import Replay
     from mjspace.view.server import serving
@@ -46,7 +61,7 @@ def _require_viser() -> None:
     Raises:
         InputError: viser is not installed.
     """
-    try:
-        import viser  # noqa: F401
-    except ImportError as error:
-        raise InputError(f"view: {error}: pip install 'mjspace[view]'") from error
+    from importlib.util import find_spec
+
+    if find_spec("viser") is None:
+        raise InputError("view needs viser: pip install 'mjspace[view]'")

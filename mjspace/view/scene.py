@@ -96,8 +96,11 @@ class Scene:
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         server.initial_camera.near = 0.01 * self.size
 
-    def show(self, moment: Moment) -> None:
-        """Move everything to where it is at that moment."""
+    def show(self, moment: Moment, trail_to: float | None = None) -> None:
+        """Move everything to where it is at that moment.
+
+        The trail is that up to the moment, or to the time ``trail_to`` [s].
+        """
         with self._server.atomic():
             poses = moment.poses
             for name, place, turn in zip(*poses[1:], strict=True):
@@ -110,7 +113,7 @@ class Scene:
                 if angle is not None:
                     _move(axes, place, angle)
             self._draw_arrows(moment, place, turn)
-            self._draw_trail(moment.time)
+            self._draw_trail(moment.time if trail_to is None else trail_to)
 
     def _pose_of_own(self, poses: Poses) -> tuple[Array, Array]:
         """Return place and attitude of the spacecraft's bus."""
