@@ -55,7 +55,7 @@ ROOMS = {
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
-    "view": "attitude contract errors log plotting reporting",
+    "view": "attitude contract errors log plotting reporting simulation",
     "cli": (
         "campaign errors interrupts log plotting rendering runner scenario simulation terminal "
         "validation view"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mjspace.errors import InputError, input_error_at
+from mjspace.terminal.options import Set, Trust
 from mjspace.terminal.reporting import open_log, progress_bar
 
 if TYPE_CHECKING:
@@ -24,15 +25,34 @@ def view(
         str, typer.Option(help="Address to serve on; but for this machine's own with a token.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 is any that is free.")] = 8080,
+    overrides: Set = [],  # noqa: B006
+    trust: Trust = False,
 ) -> None:
-    """Look at a flight in a browser."""
+    """Look at a flight in a browser: a log's, or a scenario's that is flown as you look."""
     _require_viser()
+    if not _is_log(what):
+        if export is not None:
+            raise InputError("--export: is for a log: fly the scenario first, 'mjspace run'")
+        _fly(what, overrides, host, port, trust=trust)
+        return
+    if overrides or trust:
+        raise InputError("--set, --trust: are for a scenario: a log is shown as it was flown")
     log = open_log(Path(what))
     with input_error_at("view"):
         if export is not None:
             _export(log, export)
         else:
             _replay(log, host, port)
+
+
+def _is_log(what: str) -> bool:
+    from mjspace.log.file import MAGIC
+
+    path = Path(what)
+    if path.is_file():
+        with path.open("rb") as file:
+            return file.read(len(MAGIC)) == MAGIC
+    return path.suffix == ".mcap"
 
 
 def _export(log: "Log", output: Path) -> None:
@@ -53,6 +73,23 @@ def _replay(log: "Log", host: str, port: int) -> None:
         print(f"{address}\nCtrl-C ends it.", flush=True)
         with on_signals() as stop:
             replay.run(stop)
+
+
+def _fly(scenario: str, overrides: list[str], host: str, port: int, *, trust: bool) -> None:
+    from mjspace.interrupts import on_signals
+    from mjspace.scenario.loading import load
+    from mjspace.simulation.assembly import assemble
+    from mjspace.simulation.live_flight import LiveFlight
+    from mjspace.view.live import Live
+    from mjspace.view.server import serving
+
+    loaded, folder = load(scenario, overrides)
+    assembly = assemble(loaded, folder, trust=trust)
+    with serving(host, port, "mjspace") as (server, address):
+        live = Live(server, lambda: LiveFlight(assembly))
+        print(f"{address}\nCtrl-C ends it.", flush=True)
+        with on_signals() as stop:
+            live.run(stop)
 
 
 def _require_viser() -> None:

@@ -12,7 +12,7 @@ from mjspace.plotting.panels import Curves
 COLORS = ("#f2554a", "#4dd94d", "#5a8cff", "#e0b030", "#c060e0", "#30c8c8", "#e080a0", "#a0a0a0")
 POINTS = 300
 """Of a line: as many as a plot has pixels across."""
-_WIDTH, _HEIGHT = 420, 190  # pixels
+WIDTH, HEIGHT = 420, 190  # pixels
 _MOST_LINES = 8
 
 
@@ -50,7 +50,7 @@ class Plot:
             title=printable(f"{log}{panel.title}{unit}"),
             scales={"x": {"time": False}, "y": {"range": (self._low, self._high)}},
             legend={"show": False},
-            height=_HEIGHT,
+            height=HEIGHT,
         )
 
     def show(self, time: float) -> None:
@@ -77,7 +77,7 @@ def add(gui: Any, curves: Sequence[Curves]) -> list[Plot]:
     with panel.add_tab("Plots"):
         plots = [Plot(gui, one) for one in curves]
     panel.dock_right()
-    panel.set_width(_WIDTH)
+    panel.set_width(WIDTH)
     return plots
 
 

@@ -3,6 +3,7 @@
 import contextlib
 import hmac
 import ipaddress
+import logging
 import os
 import secrets
 from collections.abc import Callable, Iterator
@@ -78,6 +79,8 @@ def serving(host: str, port: int, label: str) -> Iterator[tuple[Server, str]]:
     Raises:
         InputError: nothing can be served on that host and port.
     """
+    # Who connects and says nothing, as a browser does for later, is no error of ours.
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     token = None if is_loopback(host) else secrets.token_urlsafe(16)
     with _refuse_taken(host, port), _guarded(Guard(token)) as guarded, _quiet():
         server = Server(host=host, port=port, label=label, verbose=False)

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
 from mjspace.attitude import rotate
@@ -35,6 +36,11 @@ class Body(NamedTuple):
         """How far it reaches from its origin [m]; 0 where nothing is drawn."""
         far = [float(np.linalg.norm(mesh.vertices, axis=1).max()) for mesh in self.meshes]
         return max(far, default=0.0)
+
+
+def scene_update(serialized: bytes) -> Any:
+    """Return a ``foxglove.SceneUpdate`` that this program serialized."""
+    return SceneUpdate.FromString(serialized)
 
 
 def bodies(update: Any) -> list[Body]:
