@@ -55,7 +55,7 @@ ROOMS = {
     "dm_env": "attitude contract environment errors scenario simulation",
     "terminal": "errors log",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
-    "view": "attitude contract errors log plotting reporting simulation",
+    "view": "attitude contract errors log plotting rendering reporting simulation",
     "cli": (
         "campaign errors interrupts log plotting rendering runner scenario simulation terminal "
         "validation view"
@@ -64,7 +64,9 @@ ROOMS = {
 }
 # Outside packages that a few rooms alone may know.
 ONLY_IN = {
-    "mujoco": "vehicle environment actuators simulation log rendering dm_env runner validation",
+    "mujoco": (
+        "vehicle environment actuators simulation log rendering dm_env runner validation view"
+    ),
     "mcap": "log",
     "dm_control": "dm_env",
     "dm_env": "dm_env",
