@@ -3,15 +3,14 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-import trimesh
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
-from mjspace.attitude import rotate
 from mjspace.contract import Array
 
-_SIDES = 48  # of a cylinder
-_FINENESS = 3  # of a sphere: 1280 triangles
+_SIDES = 48  # of a cylinder and a sphere
+_RINGS = 24  # of a sphere, from pole to pole
+_Triangles = tuple[Array, NDArray[np.int_]]  # vertices and faces
 
 
 class Mesh(NamedTuple):
@@ -53,17 +52,12 @@ def bodies(update: Any) -> list[Body]:
 
 
 def _meshes(entity: Any) -> list[Mesh]:
-    found: dict[tuple[float, ...], list[tuple[Array, NDArray[np.int_]]]] = {}
-    units = {
-        "cubes": trimesh.creation.box(),
-        "cylinders": trimesh.creation.cylinder(0.5, 1.0, sections=_SIDES),
-        "spheres": trimesh.creation.icosphere(_FINENESS, 0.5),
-    }
-    for kind, unit in units.items():
+    found: dict[tuple[float, ...], list[_Triangles]] = {}
+    for kind, (vertices, faces) in _UNITS.items():
         for shape in getattr(entity, kind):
             size = np.array([shape.size.x, shape.size.y, shape.size.z])
-            placed = _placed(shape.pose, size * unit.vertices)
-            found.setdefault(_color(shape.color), []).append((placed, unit.faces))
+            placed = _placed(shape.pose, size * vertices)
+            found.setdefault(_color(shape.color), []).append((placed, faces))
     for shape in entity.triangles:
         points = np.array([(p.x, p.y, p.z) for p in shape.points]).reshape(-1, 3)
         faces = np.array(shape.indices, dtype=int).reshape(-1, 3)
@@ -75,19 +69,55 @@ def _meshes(entity: Any) -> list[Mesh]:
     return [Mesh(*_joined(parts), color) for color, parts in found.items()]
 
 
-def _joined(
-    parts: list[tuple[Array, NDArray[np.int_]]],
-) -> tuple[Array, NDArray[np.int_]]:
+def _turned(radius: Array, height: Array) -> _Triangles:
+    """Return the solid of revolution about z of an outline that begins and ends on the axis.
+
+    ``radius`` and ``height`` (n,) go upwards. At each end all of a ring's vertices are one point.
+    """
+    angle = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
+    rings = [
+        radius[:, None] * np.cos(angle),
+        radius[:, None] * np.sin(angle),
+        np.repeat(height[:, None], _SIDES, axis=1),
+    ]
+    low, side = np.mgrid[: len(radius) - 1, :_SIDES].reshape(2, -1)
+    after = (side + 1) % _SIDES
+    a, b = low * _SIDES + side, low * _SIDES + after
+    c, d = b + _SIDES, a + _SIDES
+    faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+    return np.stack(rings, axis=-1).reshape(-1, 3), faces
+
+
+def _cube() -> _Triangles:
+    corners = np.array(list(np.ndindex(2, 2, 2))) - 0.5
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [each for a, b, c, d in sides for each in ((a, b, c), (a, c, d))]
+    return corners, np.array(faces)
+
+
+_LATITUDE = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _RINGS + 1)
+_UNITS = {
+    "cubes": _cube(),
+    "cylinders": _turned(np.array([0.0, 0.5, 0.5, 0.0]), np.array([-0.5, -0.5, 0.5, 0.5])),
+    "spheres": _turned(0.5 * np.cos(_LATITUDE), 0.5 * np.sin(_LATITUDE)),
+}
+"""Solids of size 1, outward by the order of each face's vertices."""
+
+
+def _joined(parts: list[_Triangles]) -> _Triangles:
     firsts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
     faces = [of_part + first for first, (_, of_part) in zip(firsts, parts, strict=True)]
     return np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces)
 
 
 def _placed(pose: Any, points: Array) -> Array:
+    # Without mjspace.attitude, which compiles its functions when they are first called: that would
+    # be half of the time to the first picture. v + 2 w (q x v) + 2 q x (q x v).
     turn, place = pose.orientation, pose.position
-    moved = rotate(np.array([turn.w, turn.x, turn.y, turn.z]), points)
-    placed: Array = moved + np.array([place.x, place.y, place.z])
-    return placed
+    axis = np.array([turn.x, turn.y, turn.z])
+    twice = 2.0 * np.cross(axis, points)
+    placed: Array = points + turn.w * twice + np.cross(axis, twice)
+    return placed + np.array([place.x, place.y, place.z])
 
 
 def _color(color: Any) -> tuple[float, ...]:
