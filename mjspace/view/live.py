@@ -186,29 +186,25 @@ class Live:
                 hint = f"{declared['range']} {declared['form']}".strip() or None
                 label = printable(f"{name}{unit}")
                 found[name] = self._gui.add_text(label, _shown(value), hint=hint)
+            button = self._gui.add_button("Set gains")
             self._refused = self._gui.add_markdown("")
-        for name, field in found.items():
-
-            @field.on_update
-            def _(event: Any, name: str = name, field: Any = field) -> None:
-                if event.client is not None:
-                    self.ask(lambda: self._change(name, field))
-
+        button.on_click(lambda _: self.ask(self._set_gains))
         return found
 
-    def _change(self, name: str, field: Any) -> None:
-        """Change a gain to what stands in its field, or say why not."""
-        self._refused.content = ""
-        if field.value == _shown(self.flight.gains()[name][0]):
-            return
-        try:
+    def _set_gains(self) -> None:
+        """Fly on with what stands in the fields of the gains, or say what of it is refused."""
+        refused = []
+        for name, (before, _) in self.flight.gains().items():
+            text = self._gains[name].value
+            if text == _shown(before):
+                continue
             try:
-                value = json.loads(field.value)
-            except ValueError:
-                return  # it is being written
-            self.flight.set_gain(name, value)
-        except (ValueError, TypeError) as error:
-            self._refused.content = str(escape(printable(str(error))))
+                self.flight.set_gain(name, json.loads(text))
+            except json.JSONDecodeError:
+                refused.append(f"{name}: got {text!r}, should be a number, or numbers in brackets")
+            except ValueError as error:
+                refused.append(str(error))
+        self._refused.content = "\n\n".join(escape(printable(each)) for each in refused)
 
     def _add_faults(self) -> None:
         with self._gui.add_folder("Break"):

@@ -116,8 +116,9 @@ def _placed(pose: Any, points: Array) -> Array:
     turn, place = pose.orientation, pose.position
     axis = np.array([turn.x, turn.y, turn.z])
     twice = 2.0 * np.cross(axis, points)
-    placed: Array = points + turn.w * twice + np.cross(axis, twice)
-    return placed + np.array([place.x, place.y, place.z])
+    turned = points + turn.w * twice + np.cross(axis, twice)
+    placed: Array = turned + np.array([place.x, place.y, place.z])
+    return placed
 
 
 def _color(color: Any) -> tuple[float, ...]:

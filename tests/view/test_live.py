@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -66,8 +65,11 @@ def test_what_is_asked_for_is_done_between_periods_and_listed(live: Live) -> Non
 
 def test_gains_are_those_of_the_law_alone_and_refused_in_one_line(live: Live) -> None:
     assert set(live._gains) == {"attitude_gain", "rate_gain", "hysteresis"}
-    for text, said in (("9", ""), ("-1", "greater than 0"), ("[1, 2]", "shape"), ("x", "")):
-        live._change("rate_gain", SimpleNamespace(value=text))
+    refused = {"-1": "greater than 0", "[1, 2]": "shape", "x": "a number", "<b>": "&lt;b&gt;"}
+    for text, said in {"9": "", **refused, '"8"': "a number"}.items():
+        live._gains["rate_gain"].value = text
+        live.ask(live._set_gains)
+        live.advance(0.0)
         assert said in live._refused.content
         assert bool(said) == bool(live._refused.content)
     assert live.flight.gains()["rate_gain"][0] == 9.0
