@@ -6,6 +6,7 @@ import ipaddress
 import logging
 import os
 import secrets
+import socket
 from collections.abc import Callable, Iterator
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
@@ -22,6 +23,9 @@ from mjspace.errors import InputError
 LOOPBACK = "127.0.0.1"
 _HERE = {"localhost", "127.0.0.1", "::1"}
 """Names of this machine that a browser may have asked for: under another one it was led here."""
+
+_EVERYWHERE = {"0.0.0.0", "::"}
+"""Every address of this machine, and none that a browser can open."""
 
 
 class Server(viser.ViserServer):
@@ -87,7 +91,8 @@ def serving(host: str, port: int, label: str) -> Iterator[tuple[Server, str]]:
     try:
         if not guarded:
             raise RuntimeError("this version of viser serves otherwise: its requests are unchecked")
-        shown = f"[{host}]" if ":" in host else host
+        name = socket.gethostname() if host in _EVERYWHERE else host
+        shown = f"[{name}]" if ":" in name else name
         secret = f"/?token={token}" if token else ""
         yield server, f"http://{shown}:{server.get_port()}{secret}"
     finally:
@@ -106,8 +111,6 @@ def is_loopback(host: str) -> bool:
 @contextlib.contextmanager
 def _refuse_taken(host: str, port: int) -> Iterator[None]:
     # viser would go on to the next port, or to none at all, without a word.
-    import socket
-
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         with socket.socket(family, socket.SOCK_STREAM) as tried:

@@ -29,7 +29,9 @@ def local() -> Iterator[str]:
 def exposed() -> Iterator[str]:
     """The address, with its token, of a server on every interface."""
     with serving("0.0.0.0", 0, "test") as (_, address):
-        yield address.replace("0.0.0.0", "127.0.0.1")
+        place = urlsplit(address)
+        assert place.hostname == socket.gethostname().lower()
+        yield f"http://127.0.0.1:{place.port}/?{place.query}"
 
 
 def status(address: str, path: str = "/", **headers: str) -> tuple[int, dict[str, str]]:
