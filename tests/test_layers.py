@@ -62,9 +62,10 @@ ROOMS = {
     "terminal": "compiling errors log scenario",
     "conversion": "attitude contract errors log plotting rendering",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
+    "view": "attitude contract errors log plotting rendering reporting simulation",
     "cli": (
-        "campaign compiling conversion errors log plotting rendering runner scenario simulation "
-        "terminal validation"
+        "campaign compiling conversion errors interrupts log plotting rendering runner scenario "
+        "simulation terminal validation view"
     ),
     "__main__": "cli interrupts",
 }
@@ -72,7 +73,7 @@ ROOMS = {
 ONLY_IN = {
     "mujoco": (
         "vehicle environment actuators simulation log rendering dm_env gym runner validation "
-        "conversion"
+        "conversion view"
     ),
     "mcap": "log",
     "dm_control": "dm_env",

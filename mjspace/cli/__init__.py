@@ -1,12 +1,12 @@
 """The command line: ``list``, ``info``, ``run``, ``replay``, ``render``, ``plot``, ``validate``.
 
 ``campaign`` flies a scenario many times, ``falsify`` searches for a flight that fails, ``margins``
-says how much worse it may become, ``tune`` finds gains. ``report`` makes an HTML page of logs or a
-campaign. ``convert``, ``layout`` and ``compare`` are for logs, ``law-header``, ``serve-law`` and
-``linearize`` for flight software; ``recover`` saves what is whole of a damaged log. Exit status: 0
-every check came out as the scenario expects, 1 flown but one did not (or a replay or a comparison
-differed, or the flight ended early), 2 bad input. Modules are imported when a command needs them:
-``--help`` answers at once.
+says how much worse it may become, ``tune`` finds gains. ``view`` shows a log, or a scenario in
+flight, in a browser; ``report`` makes an HTML page of logs or a campaign. ``convert`` and
+``compare`` are for logs, ``law-header``, ``serve-law`` and ``linearize`` for flight software;
+``recover`` saves what is whole of a damaged log. Exit status: 0 every check came out as the
+scenario expects, 1 flown but one did not (or a replay or a comparison differed, or the flight ended
+early), 2 bad input. Modules are imported when a command needs them: ``--help`` answers at once.
 """
 
 import sys
@@ -29,6 +29,7 @@ from mjspace.cli import (
     scenarios,
     searches,
     validation,
+    views,
 )
 from mjspace.errors import print_warning
 from mjspace.rendering import graphics
@@ -64,6 +65,7 @@ app.command()(margins.margins)
 app.command()(searches.tune)
 app.command()(pictures.render)
 app.command()(pictures.plot)
+app.command()(views.view)
 app.command()(reports.report)
 app.command()(data.convert)
 app.command()(data.layout)

@@ -11,7 +11,7 @@ from mjspace.contract import Array
 from mjspace.conversion.shown import Frames
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
-from mjspace.rendering.render import flown_model
+from mjspace.rendering.flown_model import flown_model
 
 _PERIOD = 0.05  # s between arrows, at least: 20 Hz
 _ENGINE = "engine_thrust"

@@ -8,7 +8,7 @@ import numpy as np
 from mjspace.contract import Array
 from mjspace.log import topics
 from mjspace.log.reader import Log
-from mjspace.plotting.decimate import Line, outlines
+from mjspace.plotting.decimate import POINTS, Line, outlines
 from mjspace.scenario.boresight import ANGLES
 from mjspace.signals import find_signal
 from mjspace.units import Unit
@@ -104,12 +104,12 @@ OF_PARTS = {"deflection": "Tip deflection of", "displacement": "Displacement of 
 """Titles, before the part's name, of the fields of /truth that end so."""
 
 
-def curves(log: Log, *, coasting: bool = False) -> list[Curves]:
+def curves(log: Log, *, coasting: bool = False, points: int = POINTS) -> list[Curves]:
     """Return the curves of the standard page: its signals, how parts move, and the law's signals.
 
     They are at most ``MOST``, the law's last: of those the first that change. A signal that is zero
     throughout is left out, and so is one of the law's that never changes. Of a ``coasting`` vehicle
-    the attitude error says nothing.
+    the attitude error says nothing. A line has at most so many ``points``, and two.
     """
     first = (*TRANSLATION, *_of_thrust(log), *ROTATION, *_of_connections(log), *_of_parts(log))
     standard = [
@@ -121,7 +121,7 @@ def curves(log: Log, *, coasting: bool = False) -> list[Curves]:
         and not (coasting and panel.field == "attitude_error")
     ]
     law = [_of_signal(log, f"law.{field}") for field in log.topics.get("/law", {})]
-    found = read(log, [*standard, *law])
+    found = read(log, [*standard, *law], points)
     shown = [one for one in found[: len(standard)] if one.value.any()]
     changing = [one for one in found[len(standard) :] if np.ptp(one.value, axis=0).any()]
     return [*shown, *changing[:LAW_PANELS]][:MOST]
@@ -181,7 +181,7 @@ def chosen(log: Log, signals: Sequence[str]) -> list[Curves]:
     return read(log, [_of_signal(log, signal) for signal in signals])
 
 
-def read(log: Log, panels: Sequence[Panel]) -> list[Curves]:
+def read(log: Log, panels: Sequence[Panel], points: int = POINTS) -> list[Curves]:
     """Return the panels' curves from the log, which is read once; in its units of their fields."""
     panels = [replace(panel, quantity=unit(log, panel.topic, panel.field)) for panel in panels]
     lines = {}
@@ -189,7 +189,7 @@ def read(log: Log, panels: Sequence[Panel]) -> list[Curves]:
         lines[number, "value"] = Line(panel.topic, panel.field, _change(panel))
         if panel.desired is not None and panel.desired[1] in log.topics.get(panel.desired[0], {}):
             lines[number, "desired"] = Line(*panel.desired, _change(panel))
-    found = dict(zip(lines, outlines(log, list(lines.values())), strict=True))
+    found = dict(zip(lines, outlines(log, list(lines.values()), points), strict=True))
     return [
         _prefixed(Curves(panel, *found[number, "value"], *found.get((number, "desired"), ())))
         for number, panel in enumerate(panels)

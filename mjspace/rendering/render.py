@@ -1,6 +1,5 @@
 """Renders a log as a video or a picture: its model in the logged states."""
 
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 from itertools import repeat
 from pathlib import Path
@@ -10,17 +9,14 @@ import numpy as np
 from PIL import Image
 
 from mjspace.contract import Array
-from mjspace.environment.install import userdata_size
 from mjspace.errors import whole_or_none
-from mjspace.log.flown_scenario import model_of, scenario_of
+from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering import overlay
+from mjspace.rendering.flown_model import flown_model
 from mjspace.rendering.offscreen import Canvas
 from mjspace.rendering.scene import Stage
 from mjspace.rendering.video import Frame, Video
-from mjspace.scenario.scenario import Scenario
-from mjspace.vehicle.logged_model import logged_model
-from mjspace.vehicle.vehicle import build
 
 _LARGEST = 8192  # pixels: 5 GB and 17 s for a still, drawn in software
 _FASTEST = 1000.0  # frames a second
@@ -151,16 +147,6 @@ def _pulses(log: Log, times: Array) -> Iterable[Array | None]:
         return repeat(None, len(times))
     each = (nearest_rows(log, "/command", field, times) for field in sorted(fields))
     return (np.maximum.reduce(rows) for rows in zip(*each, strict=True))
-
-
-def flown_model(log: Log, scenario: Scenario) -> Any:
-    """Return the model that flew in the log, as far as a stranger's may be trusted."""
-    size = userdata_size(scenario.environment, scenario.plant)
-    with warnings.catch_warnings(action="ignore"):  # it was said when it flew
-        source = model_of(log, scenario)
-        here = build(scenario.plant, scenario.rates, userdata=size, source=source).model
-    packed = log.attachment("model.mjb.gz")
-    return logged_model(here, packed, log.metadata, log.shape("/state", "physics"))
 
 
 def shares_of_thrust(log: Log, engine: Any, times: Array) -> Iterator[float]:

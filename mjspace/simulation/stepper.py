@@ -45,8 +45,12 @@ class Stepper:
         *,
         threads: int = 1,
         inner: InnerLoop | None = None,
+        besides: Sequence[StepEffect] = (),
     ) -> None:
-        """Put the ``members`` of the campaign at ``start``; ``inner`` is the law's inner loop."""
+        """Put the ``members`` of the campaign at ``start``; ``inner`` is the law's inner loop.
+
+        The effects ``besides`` act after those of the scenario, and remember nothing.
+        """
         mujoco_warnings.silence()
         install_callbacks()
         self.batch = Batch(assembly.vehicle.model, len(members), threads)
@@ -65,7 +69,7 @@ class Stepper:
         self.memory = start.actuators
         self._actuators, self._inner, self._hold = assembly.actuators, inner, assembly.hold
         self._inputs = self._actuators.inputs(self.batch)
-        self.effects = effects_of(assembly, self.layout, members)
+        self.effects = (*effects_of(assembly, self.layout, members), *besides)
         for effect in self.effects:
             effect.bind(self.batch)
         # Most effects have few of the hooks: the others are not called in every step.

@@ -1,0 +1,1 @@
+"""Views in a browser: a log replayed, a scenario flown live, and a replay in one HTML file."""
