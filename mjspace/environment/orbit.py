@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, field_validator, model_validator
 
 from mjspace.contract import Array
-from mjspace.environment import kepler, two_line_elements
+from mjspace.environment import kepler, oblate_orbit, two_line_elements
 from mjspace.environment.base import Term
 from mjspace.environment.bodies import Bodies, add_wrench
 from mjspace.environment.compiled import compiled
@@ -107,8 +107,10 @@ class Orbit(Term):
     the two lines without either."""
 
     j2: Switch = False
-    """Whether the Earth's oblateness makes node, periapsis and mean anomaly drift, at their secular
-    rates; the elements are then mean ones, and hold for a control period each."""
+    """Whether the Earth's oblateness acts on the orbit. Elements are then mean ones: node,
+    periapsis and mean anomaly drift at their secular rates. A position and velocity are osculating:
+    the motion from them is integrated, periodic terms included. Either way an orbit holds for a
+    control period."""
 
     @field_validator("eccentricity", mode="before")
     @classmethod
@@ -157,10 +159,9 @@ class Orbit(Term):
     @model_validator(mode="after")
     def _of_the_earth(self) -> Self:
         if self.j2 and self.body not in J2:
-            raise ValueError(f'j2: the rates are those of body = "earth", not of the {self.body}')
-        if self.j2 and self.semi_major_axis is None:
-            which = "SGP4 has them already" if self.tle else "a position and velocity have none"
-            raise ValueError(f"j2: the rates are of mean elements: {which}: leave it out")
+            raise ValueError(f'j2: is that of body = "earth", not of the {self.body}')
+        if self.j2 and self.tle:
+            raise ValueError("j2: SGP4 has it already: leave it out")
         return self
 
     @model_validator(mode="after")
@@ -261,15 +262,15 @@ class Orbit(Term):
     def rows(self, time: Array) -> Array:
         """Return the elements that hold at each ``time`` [s], (...), as (..., 10).
 
-        Where they drift, GM is the pull that makes the orbit turn as it does (``j2``), or that at
-        the place, with the Earth's oblateness (``tle``). With GM alone, 1e-3 off, the tides would
-        not fit the motion, and what is beside the origin would leave it, 2,500 times as far after a
-        day at 500 km.
+        Where they drift, GM is the pull that makes the orbit turn as it does (mean elements), or
+        that at the place, with the Earth's oblateness (a ``tle``, a position and velocity). With GM
+        alone, 1e-3 off, the tides would not fit the motion, and what is beside the origin would
+        leave it, 2,500 times as far after a day at 500 km.
 
         Raises:
             ValueError: SGP4 does not know the satellite then.
         """
-        if self.tle:
+        if self.drifts_on and self.semi_major_axis is None:
             return self._osculating(np.ravel(time)).reshape(*time.shape, 10)
         elements = self.elements()
         if not self.j2:
@@ -298,13 +299,14 @@ class Orbit(Term):
             epoch = self.time_zero
             assert epoch is not None
             place, velocity = two_line_elements.motion(self.tle, epoch, time)
-            elements = elements_of(place, velocity, time, GM[self.body])
-            distance2 = np.sum(place**2, axis=-1)
-            oblate = 1.5 * J2[self.body] * RADIUS[self.body] ** 2 / distance2
-            elements[:, 0] *= 1.0 + oblate * (1.0 - 3.0 * place[:, 2] ** 2 / distance2)
-            return elements
-        place, velocity = (np.array([v], dtype=float) for v in (self.position, self.velocity))
-        return elements_of(place, velocity, time, GM[self.body])
+        else:
+            place, velocity = (np.array([v], dtype=float) for v in (self.position, self.velocity))
+            if not self.j2:
+                return elements_of(place, velocity, time, GM[self.body])
+            place, velocity = oblate_orbit.motion(place[0], velocity[0], time)
+        elements = elements_of(place, velocity, time, GM[self.body])
+        elements[:, 0] *= oblate_orbit.pull(place)
+        return elements
 
 
 def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:
