@@ -33,8 +33,8 @@ class Signals(NamedTuple):
 class TargetPointing(Gains):
     """u = k a x s + c (w_s - w) with wheels, from relative navigation and a gyro.
 
-    It reads ``rate``, the tachometers, and two fields of the measurement, in body axes: the other
-    spacecraft's position and velocity.
+    It reads ``rate``, the tachometers, and ``camera_position`` and ``camera_velocity``: the other
+    spacecraft's position and its derivative, body axes.
     """
 
     batched: ClassVar[bool] = True
@@ -43,8 +43,6 @@ class TargetPointing(Gains):
     """Unit spin axes, body axes, one row for each wheel."""
     wheel_inertia: Array = gain("kg m^2", ("wheel",), at_least=0.0)
     """Axial inertia of each wheel."""
-    target: str = "target"
-    """The fields are ``<target>_position`` and ``<target>_velocity``."""
     axis: Array = gain(shape=(3,), form="unit vector", default=(0.0, 0.0, 1.0))
     """a, as of a camera, body axes."""
     pointing_gain: float = gain("N m", default=0.5, above=0.0)
@@ -60,8 +58,8 @@ class TargetPointing(Gains):
     ) -> tuple[None, TorqueCommand, Signals]:
         """Return (None, torque of the wheels on the bus, signals)."""
         w = measurement.rate
-        place = getattr(measurement, f"{self.target}_position")
-        speed = getattr(measurement, f"{self.target}_velocity")
+        place = measurement.camera_position
+        speed = measurement.camera_velocity
         square = dot(place, place)
         distance = np.sqrt(square)
         sight = place / distance

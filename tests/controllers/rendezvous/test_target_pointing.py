@@ -18,13 +18,11 @@ def stepped(
     place: Any, speed: Any, rate: Any, wheels: float = 0.0, **gains: Any
 ) -> tuple[Array, Signals]:
     """Return the torque [N m] and the signals of one step."""
-    law = TargetPointing(
-        wheel_axes=np.eye(3), wheel_inertia=np.full(3, 0.01), axis=AXIS, target="seen", **gains
-    )
+    law = TargetPointing(wheel_axes=np.eye(3), wheel_inertia=np.full(3, 0.01), axis=AXIS, **gains)
     seen = Measurement(
         rate=np.asarray(rate, float),
-        seen_position=np.asarray(place, float),
-        seen_velocity=np.asarray(speed, float),
+        camera_position=np.asarray(place, float),
+        camera_velocity=np.asarray(speed, float),
         wheel_speed=np.full(np.shape(rate), wheels),
     )
     _, command, signals = law.step(law.reset(seen, NOWHERE), 0.0, seen, NOWHERE)
