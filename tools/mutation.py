@@ -489,7 +489,8 @@ def import_all() -> None:
     """Import what the tests will need, so that each fork has it."""
     for path in sorted([*ROOT.glob("mjspace/**/*.py"), *ROOT.glob("controllers/**/*.py")]):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-        unwanted = path.stem in ("__init__", "__main__", "basilisk_flight")
+        of_basilisk = path.stem.startswith("basilisk") and path.stem.endswith("flight")
+        unwanted = of_basilisk or path.stem in ("__init__", "__main__")
         if not unwanted and path.parent.name != "dm_env":  # which takes a second, and MuJoCo's log
             importlib.import_module(name if name.startswith("mjspace") else f"mjspace.{name}")
 

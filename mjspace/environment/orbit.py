@@ -4,7 +4,7 @@ It is given by its elements, by a position and velocity, or by a satellite's two
 """
 
 import math
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -12,13 +12,11 @@ from numpy.typing import ArrayLike
 from pydantic import Field, field_validator, model_validator
 
 from mjspace.contract import Array
-from mjspace.environment import kepler, two_line_elements
+from mjspace.environment import kepler, oblate_orbit, two_line_elements
 from mjspace.environment.base import Term
-from mjspace.environment.bodies import Bodies, add_wrench
-from mjspace.environment.compiled import compiled
 from mjspace.environment.constants import GM, J2, RADIUS
-from mjspace.environment.gravity import gradient_torque
 from mjspace.environment.osculating import elements_of
+from mjspace.environment.tides import tidal
 from mjspace.scenario.environment import Environment
 from mjspace.scenario.fields import (
     Epoch,
@@ -31,6 +29,8 @@ from mjspace.scenario.fields import (
     WithinTurn,
 )
 
+_FRESH = 14.0
+"""Days from their epoch for which two-line elements are taken for those of the satellite."""
 _NOT_GIVEN: Any = None  # a number for all who read it of an orbit that has elements
 _ELEMENTS = (
     "semi_major_axis",
@@ -40,34 +40,6 @@ _ELEMENTS = (
     "periapsis",
     "true_anomaly",
 )
-
-
-@compiled
-def tidal(orbit: Any, time: float, bodies: Bodies) -> None:
-    """Add the planet's gravity less that at the frame's origin, which falls along ``orbit``.
-
-    Every body feels it at its own centre of mass, and 3 GM/r^3 u x I u, the gravity-gradient torque
-    of its own inertia there, u the unit vector from the planet (Wertz 1978, Spacecraft Attitude
-    Determination and Control, section 17.2.1). The difference is Encke's, without cancellation
-    (Battin 1999, Mathematics and Methods of Astrodynamics, chapter 8).
-    """
-    rx, ry, rz = kepler.position(orbit, time)
-    radius2 = rx * rx + ry * ry + rz * rz
-    rate2 = orbit[0] / (radius2 * math.sqrt(radius2))
-    for body in range(1, bodies.body_mass.size):
-        mass = bodies.body_mass[body]
-        if mass == 0.0:
-            continue
-        dx, dy, dz = bodies.xipos[body]
-        x, y, z = rx + dx, ry + dy, rz + dz
-        # |R + d|^2 = (1 + q) |R|^2;  shrink = (1 + q)^(-3/2) - 1
-        q = (dx * (dx + 2.0 * rx) + dy * (dy + 2.0 * ry) + dz * (dz + 2.0 * rz)) / radius2
-        ratio3 = (1.0 + q) * math.sqrt(1.0 + q)
-        shrink = -q * (3.0 + q * (3.0 + q)) / (ratio3 * (1.0 + ratio3))
-        scale = -mass * rate2
-        force = (scale * (dx + shrink * x), scale * (dy + shrink * y), scale * (dz + shrink * z))
-        factor = 3.0 * rate2 / (ratio3 * (1.0 + q) * radius2)
-        add_wrench(bodies, body, force, gradient_torque(bodies, body, x, y, z, factor))
 
 
 class Orbit(Term):
@@ -102,13 +74,20 @@ class Orbit(Term):
     tle: list[str] | None = None
     """The two lines of a satellite of the Earth; SGP4 says where it is at each control instant, and
     its orbit holds for a control period."""
+    tle_file: str | None = None
+    """A file that has them, beside the scenario: two lines for each satellite, with a line before
+    them for its name or without. It is read with the scenario, whose log has the lines alone."""
+    satellite: str | int | None = None
+    """Which of a ``tle_file``: its name or its catalogue number. Left out where there is one."""
     epoch: Epoch | None = None
     """Of an orbit from a ``tle``: time zero, UTC, where ``environment.epoch`` is left out; that of
     the two lines without either."""
 
     j2: Switch = False
-    """Whether the Earth's oblateness makes node, periapsis and mean anomaly drift, at their secular
-    rates; the elements are then mean ones, and hold for a control period each."""
+    """Whether the Earth's oblateness acts on the orbit. Elements are then mean ones: node,
+    periapsis and mean anomaly drift at their secular rates. A position and velocity are osculating:
+    the motion from them is integrated, periodic terms included. Either way an orbit holds for a
+    control period."""
 
     @field_validator("eccentricity", mode="before")
     @classmethod
@@ -126,6 +105,16 @@ class Orbit(Term):
         if tle is not None:
             two_line_elements.refuse_malformed(tle)
         return tle
+
+    @model_validator(mode="after")
+    def _file_is_read(self) -> Self:
+        if self.tle_file is not None:
+            if self.tle:
+                raise ValueError("tle_file: got tle too: leave one of them out")
+            raise ValueError("tle_file: is read with a scenario's file: give its lines, tle")
+        if self.satellite is not None:
+            raise ValueError("satellite: is one of a tle_file")
+        return self
 
     @model_validator(mode="after")
     def _given_once(self) -> Self:
@@ -157,10 +146,9 @@ class Orbit(Term):
     @model_validator(mode="after")
     def _of_the_earth(self) -> Self:
         if self.j2 and self.body not in J2:
-            raise ValueError(f'j2: the rates are those of body = "earth", not of the {self.body}')
-        if self.j2 and self.semi_major_axis is None:
-            which = "SGP4 has them already" if self.tle else "a position and velocity have none"
-            raise ValueError(f"j2: the rates are of mean elements: {which}: leave it out")
+            raise ValueError(f'j2: is that of body = "earth", not of the {self.body}')
+        if self.j2 and self.tle:
+            raise ValueError("j2: SGP4 has it already: leave it out")
         return self
 
     @model_validator(mode="after")
@@ -193,6 +181,20 @@ class Orbit(Term):
     def time_zero(self) -> datetime | None:
         """Time zero, UTC, where the orbit says it."""
         return self.epoch or (two_line_elements.epoch_of(self.tle) if self.tle else None)
+
+    @property
+    def stale(self) -> str:
+        """A warning of two-line elements that are long before or after time zero, else empty."""
+        if not self.tle or self.epoch is None:
+            return ""
+        of = two_line_elements.epoch_of(self.tle)
+        days = abs(self.epoch - of) / timedelta(days=1)
+        if days <= _FRESH:
+            return ""
+        return (
+            f"the elements are of {of:%Y-%m-%d}, {days:.0f} days from time zero, "
+            f"{self.epoch:%Y-%m-%d}: SGP4 may be off by a kilometre or more for each day"
+        )
 
     def begun_at(self, epoch: datetime | None) -> Self:
         """Return the orbit with time zero at ``epoch``, UTC, if it depends on that.
@@ -261,15 +263,15 @@ class Orbit(Term):
     def rows(self, time: Array) -> Array:
         """Return the elements that hold at each ``time`` [s], (...), as (..., 10).
 
-        Where they drift, GM is the pull that makes the orbit turn as it does (``j2``), or that at
-        the place, with the Earth's oblateness (``tle``). With GM alone, 1e-3 off, the tides would
-        not fit the motion, and what is beside the origin would leave it, 2,500 times as far after a
-        day at 500 km.
+        Where they drift, GM is the pull that makes the orbit turn as it does (mean elements), or
+        that at the place, with the Earth's oblateness (a ``tle``, a position and velocity). With GM
+        alone, 1e-3 off, the tides would not fit the motion, and what is beside the origin would
+        leave it, 2,500 times as far after a day at 500 km.
 
         Raises:
             ValueError: SGP4 does not know the satellite then.
         """
-        if self.tle:
+        if self.drifts_on and self.semi_major_axis is None:
             return self._osculating(np.ravel(time)).reshape(*time.shape, 10)
         elements = self.elements()
         if not self.j2:
@@ -298,13 +300,14 @@ class Orbit(Term):
             epoch = self.time_zero
             assert epoch is not None
             place, velocity = two_line_elements.motion(self.tle, epoch, time)
-            elements = elements_of(place, velocity, time, GM[self.body])
-            distance2 = np.sum(place**2, axis=-1)
-            oblate = 1.5 * J2[self.body] * RADIUS[self.body] ** 2 / distance2
-            elements[:, 0] *= 1.0 + oblate * (1.0 - 3.0 * place[:, 2] ** 2 / distance2)
-            return elements
-        place, velocity = (np.array([v], dtype=float) for v in (self.position, self.velocity))
-        return elements_of(place, velocity, time, GM[self.body])
+        else:
+            place, velocity = (np.array([v], dtype=float) for v in (self.position, self.velocity))
+            if not self.j2:
+                return elements_of(place, velocity, time, GM[self.body])
+            place, velocity = oblate_orbit.motion(place[0], velocity[0], time)
+        elements = elements_of(place, velocity, time, GM[self.body])
+        elements[:, 0] *= oblate_orbit.pull(place)
+        return elements
 
 
 def orbit_position(orbit: Orbit, time: ArrayLike) -> Array:

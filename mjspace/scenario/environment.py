@@ -69,6 +69,11 @@ class Environment(Table):
         return self.epoch or (None if self.orbit is None else self.orbit.time_zero)
 
     @property
+    def stale_orbit(self) -> str:
+        """A warning of an orbit that is not known any more at time zero; empty for any other."""
+        return "" if self.orbit is None else str(self.orbit.stale)
+
+    @property
     def has_sun(self) -> bool:
         """Whether it is known where the Sun is."""
         return self.time_zero is not None and self.orbit is not None and self.orbit.body == "earth"

@@ -10,7 +10,7 @@ import tomli_w
 from pydantic import BaseModel, ValidationError
 
 from mjspace.errors import InputError, nearest, shortened
-from mjspace.scenario import files
+from mjspace.scenario import files, satellite_file
 from mjspace.scenario import overrides as keys
 from mjspace.scenario.construct import plain
 from mjspace.scenario.declared import tables_in, type_of
@@ -40,11 +40,14 @@ def read(
     """Return the scenario's table with the overrides, unvalidated, its file, and what set each key.
 
     Raises:
-        InputError: no such scenario, no TOML, or an override that is none.
+        InputError: no such scenario, no TOML, an override that is none, or a file of two-line
+            elements that has no such satellite.
     """
     path = files.find(str(scenario))
     table = files.read(path)
-    return table, path, keys.apply(table, overrides)
+    origins = keys.apply(table, overrides)
+    satellite_file.put_lines(table, path, origins)
+    return table, path, origins
 
 
 def validated(table: dict[str, Any], where: str, origins: Mapping[str, str] = {}) -> Scenario:
@@ -66,6 +69,8 @@ def validated(table: dict[str, Any], where: str, origins: Mapping[str, str] = {}
             )
             kept = [one for one in measured if one not in late]
             found = found.model_copy(update={what: kept})
+    if stale := found.environment.stale_orbit:
+        warnings.warn(f"environment.orbit.tle: {stale}", stacklevel=3)
     return found
 
 

@@ -23,10 +23,11 @@ def effects_of(
     scenario, model = assembly.scenario, assembly.vehicle.model
     sensors, around = assembly.vehicle.sensors, scenario.environment.gravity
     gravity = None if around is None else around.acceleration
+    burning = BurningMass.of(assembly.actuators)
     every = (
         ground_contact.of(model, layout.struts, layout.velocity),
-        BurningMass.of(assembly.actuators),
-        ModelSensors.of(model, sensors, gravity),
+        burning,
+        ModelSensors.of(model, sensors, gravity, burning),
         Connections.of(assembly),
         ActuatorFaults.of(assembly, members),
         KnownBeforehand.of(assembly.known, scenario),

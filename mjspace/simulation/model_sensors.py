@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array, Event, Measurement
+from mjspace.simulation.burning_mass import BurningMass
 from mjspace.simulation.sensed_weight import SensedWeight, weights_of
 from mjspace.vehicle.indices import columns_of
 from mjspace.vehicle.model_sensors import ModelSensor
@@ -35,6 +36,8 @@ class ModelSensors(StepEffect):
     of_forces: bool
     weights: tuple[SensedWeight, ...]
     """What gravity changes in those that feel it; none without gravity."""
+    burning: BurningMass | None
+    """What tells of the bodies that lose propellant."""
     _batch: Any = field(init=False, repr=False, default=None)
     _sensordata: Any = field(init=False, repr=False, default=None)
 
@@ -44,10 +47,12 @@ class ModelSensors(StepEffect):
         model: Any,
         sensors: Sequence[ModelSensor],
         gravity: Callable[[Array], Array] | None,
+        burning: BurningMass | None,
     ) -> Self | None:
         """Return the effect for the ``sensors``; None without any.
 
         ``gravity`` returns what acts on the vehicle [m/s^2], (..., 3), at positions [m], (..., 3).
+        ``burning`` has the masses of an instant; None where none burns.
         """
         if not sensors:
             return None
@@ -58,6 +63,7 @@ class ModelSensors(StepEffect):
             columns=columns,
             of_forces=any(each.of_forces for each in sensors),
             weights=weights,
+            burning=burning,
         )
 
     def bind(self, batch: Any) -> None:
@@ -84,10 +90,18 @@ class ModelSensors(StepEffect):
     def look(self, memory: State, physics: Array, sensordata: Array) -> tuple[State, Array]:
         """Return the memory with what they read now; there is no event."""
         read = {name: sensordata[:, part] for name, part in self.columns.items()}
+        burning = self._burning(memory) if self.weights else {}
         for weight in self.weights:
-            read[weight.field] = read[weight.field] - weight.felt(sensordata)
+            read[weight.field] = read[weight.field] - weight.felt(sensordata, burning)
         named = {f"{PREFIX}{name}": values for name, values in read.items()}
         return memory | named, np.zeros((len(physics), 1), bool)
+
+    def _burning(self, memory: State) -> dict[int, Array]:
+        """Return the mass [kg], (N,), of each body that burns; none as the flight begins."""
+        if self.burning is None or not memory:
+            return {}
+        changes = self.burning.masses(memory, memory)
+        return {body: values for field, body, values in changes if field == "body_mass"}
 
     def add_to_truth(self, memory: State, truth: Measurement) -> Measurement:
         """Return the truth with a field for each sensor."""

@@ -38,6 +38,7 @@ TLE = [
     "1 28057U 03049A   06177.78615833  .00000060  00000-0  35940-4 0  1836",
     "2 28057  98.4283 247.6961 0000884  88.1964 271.9322 14.35478080140550",
 ]
+STATE = "position=['6878.137 km',0,0],velocity=[0,'-0.98 km/s','7.55 km/s']"
 
 
 def test_a_sun_synchronous_orbit_keeps_up_with_the_sun() -> None:
@@ -107,6 +108,7 @@ def test_it_is_the_kepler_orbit_that_turns() -> None:
             0.25,
         ),
         ([f"environment.orbit={{tle={TLE}}}"], 0.1),  # 22 m
+        ([f"environment.orbit={{{STATE},j2=true}}"], 0.1),  # 36 m with GM alone
     ],
 )
 def test_what_is_beside_the_origin_stays_there(
@@ -130,5 +132,5 @@ def test_what_is_beside_the_origin_stays_there(
 
 
 def test_of_the_earth_alone() -> None:
-    with pytest.raises(ValidationError, match="j2: the rates are those of body"):
+    with pytest.raises(ValidationError, match="j2: is that of body"):
         Orbit(body="moon", semi_major_axis=3e6, j2=True)

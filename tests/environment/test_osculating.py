@@ -79,10 +79,6 @@ def test_a_motion_is_its_own_at_any_time() -> None:
             "got inclination and position: an orbit has elements, a position and velocity, ",
         ),
         (
-            {"position": [7e6, 0, 0], "velocity": [0, 7.6e3, 0], "j2": True},
-            "j2: the rates are of mean elements: a position and velocity have none",
-        ),
-        (
             {"position": [0, 0, 0], "velocity": [0, 7.5e3, 0]},
             "position: got the centre of the body",
         ),

@@ -127,7 +127,7 @@ def test_bad_lines_are_refused_in_one(message: str) -> None:
 
 
 def test_what_goes_not_with_a_tle_is_refused() -> None:
-    with pytest.raises(ValidationError, match=r"j2: .* SGP4 has them already"):
+    with pytest.raises(ValidationError, match="j2: SGP4 has it already"):
         Orbit(tle=CBERS, j2=True)
     with pytest.raises(ValidationError, match="got eccentricity and tle: an orbit has"):
         Orbit(tle=CBERS, eccentricity=0.1)

@@ -248,3 +248,17 @@ def test_a_scenario_says_how_a_sensor_samples(tmp_path: Path) -> None:
         for text in (PROBE, PROBE.replace('accelerometer name="imu" ', late))
     )
     assert_same(flown(plain), flown(delayed))
+
+
+def test_a_sensor_that_carries_a_burning_tank_feels_the_weight_that_is_left(tmp_path: Path) -> None:
+    """What is between the whole vehicle and nothing is the thrust, whatever it weighs."""
+    whole = BALANCED.replace("<sensor>", '<sensor><force name="whole" site="imu"/>')
+    path = burning(tmp_path, whole, extra="[environment.gravity]\nbody = 'earth'\n")
+    built = assemble(*load(path, [BURNS, "duration=1"]))
+    python = flown(built, (0, 1), compiled=False)
+    felt = python.rows["/measurement.whole"]
+    # 50 g are gone in the end, 0.5 N of weight; MuJoCo's sum of forces rounds 110 N.
+    np.testing.assert_allclose(felt[1:, ..., 2], 4.0, atol=1e-9)
+    compiled = flown(built, (0, 1), threads=2)
+    assert compiled.compiled.startswith("compiled: sensors, law, actuators and step effects")
+    assert_same(compiled, python)

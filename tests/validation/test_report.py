@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mjspace.validation import figures, report, table
+from mjspace.validation import basilisk_orbit, figures, report, table
 from mjspace.validation.benchmark import Bound
 from mjspace.validation.benchmarks import ALL
 from mjspace.validation.passport import Finding, Passport
@@ -115,8 +115,13 @@ def test_the_page_in_docs_is_of_these_benchmarks() -> None:
         assert f"## {benchmark.title}\n" in page, "run make validation"
         for bound in benchmark.bounds:
             assert bound.reason.replace("|", "\\|") in page, "run make validation"
+    for case in basilisk_orbit.CASES:
+        assert f"## {case.title}, against Basilisk" in page, "run make validation"
+        for bound in case.bounds:
+            assert bound.reason in page, "run make validation"
     drawn = {path.stem for path in (docs / "validation").iterdir()}
-    assert drawn == {benchmark.name for benchmark in ALL} | {"basilisk"}
+    against = {"basilisk", *(case.name for case in basilisk_orbit.CASES)}
+    assert drawn == {benchmark.name for benchmark in ALL} | against
 
 
 def test_a_figure_is_the_same_every_time_and_well_formed() -> None:

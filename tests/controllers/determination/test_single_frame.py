@@ -53,3 +53,35 @@ def test_exact_samples_give_the_attitude_and_none_the_identity() -> None:
     assert np.array_equal(law.step(state, 0.0, dark)[1].attitude, estimate.attitude)
     first = law.step(law.reset(dark), 0.0, dark)[1].attitude
     assert np.array_equal(first, np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)))
+
+
+def test_triad_trusts_the_sun_alone_and_the_q_method_both_by_their_weights() -> None:
+    """Sun and field are measured apart by more than they are: who is turned, and by how much."""
+    apart = 0.01  # rad, added to the angle between them
+    q = att.normalize(np.array([0.3, -0.5, 0.7, 0.4]))
+    sun, field = np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.8, 0.0])
+    moved = np.array([np.cos(np.arctan2(0.8, 0.6) + apart), np.sin(np.arctan2(0.8, 0.6) + apart)])
+    strength, sun_noise, field_noise = 4e-5, 1e-3, 8e-8  # of the field's direction 2e-3
+    seen = Measurement(
+        sun_direction=att.rotate(att.conjugate(q), sun),
+        magnetic_field=strength * att.rotate(att.conjugate(q), np.array([*moved, 0.0])),
+        sun_reference=sun,
+        field_reference=strength * field,
+    )
+
+    def off(method: str, **noise: float) -> float:
+        """Return the angle [rad] from the Sun where it is to where the estimate has it."""
+        gains = {"sun_noise": sun_noise, "field_noise": field_noise} | noise
+        law = SingleFrame(method=method, **gains)
+        estimate = law.step(law.reset(seen), 0.0, seen)[1].attitude
+        found = att.rotate(estimate, seen.sun_direction)
+        return float(np.arctan2(np.linalg.norm(np.cross(found, sun)), found @ sun))
+
+    # Wahba's loss of two directions in a plane: each turns by the other's part of the weights, to
+    # the third order in the angle, 1e-6 / 12.
+    share = (strength / field_noise) ** 2 / ((strength / field_noise) ** 2 + sun_noise**-2)
+    assert share == pytest.approx(0.2)
+    assert off("q_method") == pytest.approx(share * apart, abs=1e-6)
+    assert off("q_method", field_noise=strength * sun_noise) == pytest.approx(0.5 * apart, abs=1e-6)
+    assert off("triad") < 1e-15
+    assert off("triad", field_noise=strength * sun_noise) < 1e-15

@@ -1,7 +1,7 @@
 """Flies a chain of hinged bodies on a free bus in Basilisk: a script for an interpreter with bsk.
 
 It does not import mjspace, which that interpreter need not have. It reads the vehicle as JSON from
-standard input (SI units, as ``basilisk.describe`` returns it) and writes the motion as JSON.
+standard input (SI units, as ``basilisk_chain.describe`` returns it) and writes the motion as JSON.
 """
 
 import json
