@@ -17,6 +17,7 @@ from mjspace.scenario.construct import plain
 from mjspace.scenario.dispersions import Dispersion, refuse_mode_outside
 from mjspace.scenario.loading import read, to_toml, validated
 from mjspace.scenario.scenario import Scenario
+from mjspace.scenario.trust import files_noted
 from mjspace.simulation.assembly import Assembly, assemble
 
 STATE = {
@@ -56,9 +57,13 @@ class Population:
     """The scenario as it is written, with the overrides."""
     path: Path
     """Of its file."""
+    folder: Path
+    """Where the files that it names are: its own, but on another machine."""
     origins: Mapping[str, str]
     """The option that set each overridden key."""
     nominal: Assembly
+    files: Mapping[str, Path]
+    """The user's files that were read, by the names that the scenario gives them."""
 
     @property
     def scenario(self) -> Scenario:
@@ -128,7 +133,7 @@ class Population:
                 scenario = validated(table, str(self.path), self.origins)
                 vehicle = self._same_vehicle(scenario)
                 assembly = assemble(
-                    scenario, self.path.parent, trust=self.campaign.trust, vehicle=vehicle
+                    scenario, self.folder, trust=self.campaign.trust, vehicle=vehicle
                 )
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
@@ -151,16 +156,33 @@ def population(campaign: Campaign, *, alike: bool = False) -> Population:
         InputError: bad input, in one line; unless they may be ``alike``, that they would be.
     """
     table, path, origins = read(campaign.scenario, campaign.all_overrides)
-    scenario = validated(table, str(path), origins)
-    nominal = assemble(scenario, path.parent, trust=campaign.trust)
-    differ = scenario.dispersions or scenario.faults or nominal.sensors([0]).ticks
+    found = populated(campaign, table, path, path.parent, origins)
+    scenario = found.scenario
+    differ = scenario.dispersions or scenario.faults or found.nominal.sensors([0]).ticks
     if not (differ or alike):
         raise InputError(f"{path}: dispersions: none, and no noise: every member would be alike")
-    found = Population(campaign, table, path, origins, nominal)
     for number, dispersion in enumerate(scenario.dispersions):
         with input_error_at(f"{path}: dispersions.{number}.key"):
             _refuse_unfit(dispersion, value_at(found.written, dispersion.path))
     return found
+
+
+def populated(
+    campaign: Campaign,
+    table: Mapping[str, Any],
+    path: Path,
+    folder: Path,
+    origins: Mapping[str, str],
+) -> Population:
+    """Return the members of a scenario's ``table``, with the files in the ``folder``.
+
+    Raises:
+        InputError: bad input, in one line.
+    """
+    scenario = validated(dict(table), str(path), origins)
+    with files_noted() as files:
+        nominal = assemble(scenario, folder, trust=campaign.trust)
+    return Population(campaign, table, path, folder, origins, nominal, files)
 
 
 def value_at(table: Any, path: Sequence[str]) -> Any:
