@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from logging import CRITICAL, getLogger
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -100,7 +101,7 @@ class _Run:
 
     def begin(self, calls: Iterator[tuple[Any, Any]], most: int, *, priority: int = 0) -> None:
         """Begin so many of the calls."""
-        for _, (function, arguments) in zip(range(most), calls, strict=False):
+        for function, arguments in islice(calls, most):
             self._number += 1
             key = (f"{function.__name__.strip('_')}-{self._name}", self._number)
             future = self._cluster.client.submit(

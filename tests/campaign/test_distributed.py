@@ -172,13 +172,18 @@ def workers(count: int) -> Iterator[distributed.Cluster]:
                 each.wait()
 
 
+def interrupt(flown: int, _failed: int) -> None:
+    if flown == 2:
+        signal.raise_signal(signal.SIGINT)
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("here")
 @pytest.mark.filterwarnings("default")  # of Dask's threads and sockets
 def test_a_killed_worker_costs_nothing_but_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two workers, of which one is killed in flight; then one; other blocks; and alone."""
+    """Two workers, of which one is killed in flight; one, interrupted and resumed; and alone."""
     what = Campaign(scenario(tmp_path), (), 8, seed=2)
     alone = fly(what, tmp_path / "alone", block=1, keep="failures")
     with workers(2) as dask:
@@ -207,8 +212,11 @@ def test_a_killed_worker_costs_nothing_but_time(
             one, other = (Log(p).read("/state") for p in (path, log_of(out, int(path.parent.name))))
             assert all(one[field].tobytes() == other[field].tobytes() for field in other)
         assert len(dask.client.nthreads()) == 1
-        table = fly(what, tmp_path / "one", dask=dask, block=5, keep="none")
-        assert bytes_of(table) == bytes_of(alone)
+        again = tmp_path / "again"
+        flight = campaigns.fly(what, again, dask=dask, block=2, keep="none", told=interrupt)
+        assert flight.signal == signal.SIGINT
+        assert flight.store.read().num_rows == 2
+        assert bytes_of(fly(what, again, dask=dask, block=5, keep="none")) == bytes_of(alone)
         newer = facts() | {"mujoco": "4.9"}
         monkeypatch.setattr(distributed, "facts", lambda: newer)
         with (
