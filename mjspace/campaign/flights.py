@@ -13,9 +13,11 @@ import numpy as np
 
 from mjspace.campaign.alike import alike
 from mjspace.campaign.members import Campaign, Population, population
+from mjspace.campaign.places import is_remote, write_whole
 from mjspace.contract import Array
 from mjspace.errors import FlightError, InputError
 from mjspace.interrupts import Interrupted
+from mjspace.runner import scratch
 from mjspace.runner.checks import Judge, Verdict
 from mjspace.runner.metrics import Measured
 from mjspace.runner.output import LOG
@@ -53,7 +55,6 @@ class Call:
     identity: dict[str, Any]
     members: tuple[int, ...]
     keep: str
-    """The logs that are kept: of ``failures``, of ``all`` or of ``none``."""
     out: Path
 
 
@@ -91,19 +92,34 @@ def fly_members(call: Call) -> list[Flown]:
         OSError: a log cannot be written.
     """
     members = same(call.campaign, call.identity)
+    flown = fly_numbers(members, call.members)
+    for one in flown:
+        if keeps(call.keep, one):
+            keep_log(members, one, log_of(call.out, one.member))
+    return flown
+
+
+def fly_numbers(members: Population, numbers: Sequence[int]) -> list[Flown]:
+    """Fly the members of these numbers; no log is written.
+
+    Raises:
+        InputError: the scenario does not admit what a member drew.
+        FlightError: a draw did not arrive in the flight.
+    """
     flown: list[Flown] = []
     group: list[_Member] = []
-    for number in call.members:
+    for number in numbers:
         member = _Member.of(members, number)
         if group and not alike(group[0].assembly, member.assembly):
             flown += _side_by_side(group)
             group = []
         group.append(member)
-    flown += _side_by_side(group)
-    for one in flown:
-        if call.keep == "all" or (call.keep == "failures" and not one.passed):
-            _keep_log(members, one, log_of(call.out, one.member))
-    return flown
+    return flown + _side_by_side(group)
+
+
+def keeps(keep: str, one: Flown) -> bool:
+    """Return whether the log of a member is kept: of ``failures``, of ``all`` or of ``none``."""
+    return keep == "all" or (keep == "failures" and not one.passed)
 
 
 def same(campaign: Campaign, identity: Mapping[str, Any], *, alike: bool = False) -> Population:
@@ -182,8 +198,19 @@ def judged(assembly: Assembly, start: Start, members: Sequence[int]) -> tuple[li
     return judges, trouble
 
 
-def _keep_log(members: Population, flown: Flown, path: Path) -> None:
-    """Fly a member once more, into a log, and see that it is as it was."""
+def keep_log(members: Population, flown: Flown, path: Path) -> None:
+    """Fly a member once more, into a log, and see that it is as it was.
+
+    Raises:
+        FlightError: it is not.
+        OSError: the log cannot be written.
+    """
+    if is_remote(path):
+        with scratch.folder() as folder:
+            keep_log(members, flown, log := folder / LOG)
+            if log.is_file():
+                write_whole(path, log.read_bytes())
+        return
     assembly, _ = members.member(flown.member)
     try:
         result = fly_to_log(assembly, path, member=flown.member, force=True)

@@ -19,6 +19,7 @@ from mjspace.scenario.dispersions import Dispersion, path_of, refuse_mode_outsid
 from mjspace.scenario.loading import read, to_toml, validated
 from mjspace.scenario.plant import Initial
 from mjspace.scenario.scenario import Scenario
+from mjspace.scenario.trust import files_noted
 from mjspace.simulation.assembly import Assembly, assemble, starting_at
 
 STATE = {
@@ -58,9 +59,13 @@ class Population:
     """The scenario as it is written, with the overrides."""
     path: Path
     """Of its file."""
+    folder: Path
+    """Where the files that it names are: its own, but on another machine."""
     origins: Mapping[str, str]
     """The option that set each overridden key."""
     nominal: Assembly
+    files: Mapping[str, Path]
+    """The user's files that were read, by the names that the scenario gives them."""
     nominal_is_of_table: bool = True
     """Whether nothing but draws has changed since the nominal one was assembled."""
 
@@ -172,7 +177,7 @@ class Population:
         scenario = validated(table, str(self.path), self.origins)
         return assemble(
             scenario,
-            self.path.parent,
+            self.folder,
             trust=self.campaign.trust,
             vehicle=self._same_vehicle(scenario),
         )
@@ -191,24 +196,29 @@ def population(campaign: Campaign, *, alike: bool = False) -> Population:
         InputError: bad input, in one line; unless they may be ``alike``, that they would be.
     """
     table, path, origins = read(campaign.scenario, campaign.all_overrides)
-    found = population_of(campaign, table, path, origins)
+    found = populated(campaign, table, path, path.parent, origins)
     differ = found.dispersions or found.scenario.faults or found.nominal.sensors([0]).ticks
     if not (differ or alike):
         raise InputError(f"{path}: dispersions: none, and no noise: every member would be alike")
     return found
 
 
-def population_of(
-    campaign: Campaign, table: Mapping[str, Any], path: Path, origins: Mapping[str, str]
+def populated(
+    campaign: Campaign,
+    table: Mapping[str, Any],
+    path: Path,
+    folder: Path,
+    origins: Mapping[str, str],
 ) -> Population:
-    """Return the members of the campaign whose scenario is in the ``table``, as it was ``read``.
+    """Return the members of a scenario's ``table``, with the files in the ``folder``.
 
     Raises:
         InputError: bad input, in one line.
     """
     scenario = validated(dict(table), str(path), origins)
-    nominal = assemble(scenario, path.parent, trust=campaign.trust)
-    found = Population(campaign, table, path, origins, nominal)
+    with files_noted() as files:
+        nominal = assemble(scenario, folder, trust=campaign.trust)
+    found = Population(campaign, table, path, folder, origins, nominal, files)
     for number, dispersion in enumerate(scenario.dispersions):
         with input_error_at(f"{path}: dispersions.{number}.{'keys' if dispersion.keys else 'key'}"):
             for key in dispersion.all_keys:

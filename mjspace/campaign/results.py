@@ -64,13 +64,6 @@ class Results:
         self._arrow = pyarrow_for("a campaign")
         self.folder, self._blocks = folder, folder / "members"
 
-    def finished(self) -> set[int]:
-        """Return the members that have been flown."""
-        found: set[int] = set()
-        for path in self._files():
-            found |= set(self._table(path, ["member"])["member"].to_pylist())
-        return found
-
     def read(self, columns: Sequence[str] | None = None) -> Any:
         """Return the table of all members flown, or these columns of it, in their order.
 
@@ -81,7 +74,7 @@ class Results:
         tables = [self._table(path, chosen) for path in self._files()]
         if not tables:
             return self._empty()
-        return self._arrow.concat_tables(tables).sort_by("member").combine_chunks()
+        return self._whole(tables)
 
     def column(self, name: str) -> Array:
         """Return a column of numbers, nan where there is none."""
@@ -103,6 +96,16 @@ class Results:
                 return found
         raise KeyError(member)
 
+    def _whole(self, tables: Sequence[Any]) -> Any:
+        """Return one table of the members of several, in their order.
+
+        A member may be in two files: small ones are removed once a large one has what they have.
+        """
+        table = self._arrow.concat_tables(tables).sort_by("member").combine_chunks()
+        member = table["member"].to_numpy()
+        first = np.append(True, member[1:] != member[:-1])[: len(member)]
+        return table if first.all() else table.filter(first).combine_chunks()
+
     def _empty(self) -> Any:
         raise InputError(f"{self.folder}: holds no member of a campaign")
 
@@ -117,7 +120,8 @@ class Results:
 
     def _table(self, path: Path, columns: list[str] | None) -> Any:
         try:
-            return self._arrow.parquet.read_table(path, columns=columns)
+            with path.open("rb") as file:
+                return self._arrow.parquet.read_table(file, columns=columns)
         except self._arrow.ArrowInvalid as error:
             raise InputError(f"{path}: {error}: remove it, and its members fly again") from error
 

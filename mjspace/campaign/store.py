@@ -1,16 +1,17 @@
-"""A campaign's folder: what it flies, and a Parquet file for each block of members."""
+"""A campaign's folder: what it flies, and Parquet files with what its members did."""
 
 import json
 import math
-import os
 import re
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from mjspace.campaign.flights import Flown
 from mjspace.campaign.members import Population
+from mjspace.campaign.places import is_remote, write_whole
 from mjspace.campaign.results import (
     DESCRIPTION,
     WALL_TIME,
@@ -23,6 +24,9 @@ from mjspace.log import lock
 from mjspace.log.provenance import software
 from mjspace.runner.checks import Verdict, margin
 from mjspace.runner.output import make_folder
+
+PART = 4096
+"""Members in a file in the end: of a small file, most is its own description."""
 
 
 class Store(JudgedResults):
@@ -62,15 +66,18 @@ class Store(JudgedResults):
             raise InputError(f"{self.folder}: holds something else: give another folder by --out")
         if here and self._files():  # else nothing is lost with what was tried before
             self._refuse_another(description)
+        text = json.dumps(self._description(), indent=2).encode()
+        if is_remote(self.folder):  # which has no locks, and nothing unfinished
+            write_whole(description, text)
+            yield
+            return
         make_folder(self._blocks)
         with (self.folder / "lock").open("ab") as file:
             if not lock.lock(file.fileno()):
                 raise InputError(f"{self.folder}: another process flies this campaign")
             for left in self._blocks.glob("*.part"):
                 left.unlink()
-            unfinished = description.with_suffix(".part")
-            unfinished.write_text(json.dumps(self._description(), indent=2))
-            os.replace(unfinished, description)
+            write_whole(description, text)
             yield
 
     def _description(self) -> dict[str, Any]:
@@ -114,11 +121,36 @@ class Store(JudgedResults):
             OSError: it cannot be written.
         """
         rows = [self._row(one) for one in flown]
-        table = self._arrow.Table.from_pylist(rows, schema=self._schema)
-        name = f"{flown[0].member:08d}-{flown[-1].member:08d}.parquet"
-        unfinished = self._blocks / f"{name}.part"
-        self._arrow.parquet.write_table(table, unfinished)
-        os.replace(unfinished, self._blocks / name)
+        self._write(self._arrow.Table.from_pylist(rows, schema=self._schema))
+
+    def compact(self, parts: Iterable[int]) -> None:
+        """Put the files of each of the parts, of which every member has been flown, into one.
+
+        A part is ``PART`` members; its files are removed once the one is there.
+
+        Raises:
+            InputError: a file is damaged.
+            OSError: it cannot be written.
+        """
+        files: dict[int, list[Path]] = defaultdict(list)
+        for path in self._files():
+            files[int(path.stem.partition("-")[0]) // PART].append(path)
+        for part in parts:
+            if len(files[part]) > 1:
+                whole = self._whole([self._table(path, None) for path in files[part]])
+                written = self._write(whole)
+                for path in files[part]:
+                    if path.name != written.name:
+                        path.unlink()
+
+    def _write(self, table: Any) -> Path:
+        """Write a table of consecutive members, as a whole or not at all; return its file."""
+        first, last = (table["member"][i].as_py() for i in (0, -1))
+        sink = self._arrow.BufferOutputStream()
+        self._arrow.parquet.write_table(table, sink)
+        path = self._blocks / f"{first:08d}-{last:08d}.parquet"
+        write_whole(path, sink.getvalue().to_pybytes())
+        return path
 
     def _row(self, flown: Flown) -> dict[str, Any]:
         numbers = [x for each in flown.draws for x in (each if isinstance(each, list) else [each])]

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import sys
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -31,11 +32,11 @@ def campaign(
     overrides: Set = [],  # noqa: B006
     seed: Annotated[int | None, typer.Option(help="Seed of every draw and sensor.")] = None,
     out: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "--out",
-            help="Folder of the results, where the same command goes on; "
-            "runs/<scenario>/campaign-seed-<seed> when left out.",
+            help="Folder of the results, or URL as s3://bucket/folder, where the same command goes "
+            "on; runs/<scenario>/campaign-seed-<seed> when left out.",
         ),
     ] = None,
     keep: Annotated[Keep, typer.Option(help="Whose logs are kept.")] = Keep.failures,
@@ -46,6 +47,12 @@ def campaign(
         int | None, typer.Option(help="Fly this member alone, into a log, and judge it.")
     ] = None,
     workers: Workers = None,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Fly on the Dask cluster of this scheduler, tcp://host:8786."
+        ),
+    ] = None,
     report_it: Annotated[
         bool, typer.Option("--report", help="Also write a report of the answer: report.html.")
     ] = False,
@@ -58,21 +65,29 @@ def campaign(
     """Fly a scenario many times with its dispersions: how often does it work?"""
     from mjspace.campaign import campaign as flown
     from mjspace.campaign import report, statistics
+    from mjspace.campaign.distributed import cluster
     from mjspace.campaign.members import Campaign
+    from mjspace.campaign.places import is_remote, place
 
     if count < 1:
         raise InputError(f"--n {count}: should be 1 or more")
     if force and member is None:
         raise InputError("--force: replaces the log of a --member; a campaign replaces nothing")
+    if dask and (workers or member is not None):
+        raise InputError("--dask: goes without --workers and --member, which fly on this machine")
     required = statistics.gate(gate) if gate else None
     what = Campaign(scenario, tuple(overrides), count, seed, trust)
-    folder = flown.folder_of(what, out)
+    folder = flown.folder_of(what, place(out) if out else None)
+    if report_it and is_remote(folder):
+        raise InputError("--report: is written to a folder: give one by --out")
     if member is not None:
         if report_it:
             raise InputError("--report: is of a campaign; 'mjspace report' makes that of a log")
         _one(what, folder, member, force, as_json, traceback)
-    with cause_shown(traceback), count_bar(count, "flying") as told:
-        flight = flown.fly(what, folder, keep=keep.value, processes=workers, told=told)
+    with cause_shown(traceback), ExitStack() as stack:
+        on = stack.enter_context(cluster(dask)) if dask else None
+        told = stack.enter_context(count_bar(count, "flying"))
+        flight = flown.fly(what, folder, keep=keep.value, processes=workers, dask=on, told=told)
     found = report.answer(flight.store, required)
     pictures = {"report": folder / "report.html"} if report_it else {}
     if report_it:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjspace.campaign.alike import alike
-from mjspace.campaign.members import Campaign, population_of
+from mjspace.campaign.members import Campaign, populated
 from mjspace.contract import Array, Event
 from mjspace.learning.action import Action
 from mjspace.learning.desired import Desired
@@ -55,7 +55,7 @@ class Episodes:
         still["law"] = {"kind": "coast:Coast"}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # they have been shown
-            self._members = population_of(campaign, still, path, origins)
+            self._members = populated(campaign, still, path, path.parent, origins)
         self.nominal = self._members.nominal
         self.action, self.last = Action(self.nominal), last_period(self.nominal.scenario)
         self._threads = threads

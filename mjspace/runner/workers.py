@@ -8,6 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 from multiprocessing import (
     forkserver,
     get_all_start_methods,
@@ -29,6 +30,8 @@ _CONTEXT = get_context(_METHOD)
 _DIES_WITH_PARENT = "mjspace.runner.dies_with_parent"  # what imports it does
 _LOOK = 0.2
 """A request to stop is looked for so often [s]."""
+_AHEAD = 1000
+"""Calls that a pool holds at most: each time that it is waited for takes a time for each."""
 _stopped, _idle = Event(), Event()
 """Of a worker: it begins nothing any more; it is not making a call."""
 _Result = TypeVar("_Result")
@@ -97,10 +100,15 @@ def _made(
 ) -> Generator[tuple[int, _Result], None, None]:
     """Make calls in the ``pool``, which ends when ``ours`` is closed."""
     due: dict[Future[Any], int] = {}
+    left = enumerate(calls)
+
+    def submit(count: int) -> None:
+        for index, (call, argument) in islice(left, count):
+            due[pool.submit(_make, call, argument)] = index
+
     try:
         with stop.breakable(at_once=True):  # the first waits until everything is imported
-            for index, (call, argument) in enumerate(calls):
-                due[pool.submit(_make, call, argument)] = index
+            submit(_AHEAD)
         while due:
             done, _ = wait(due, timeout=_LOOK, return_when=FIRST_COMPLETED)
             for future in done:
@@ -109,7 +117,10 @@ def _made(
                     yield index, result
             if stop() and not ours.closed:
                 ours.close()
-                due = {future: index for future, index in due.items() if not future.cancel()}
+                for future in [future for future in due if future.cancel()]:
+                    del due[future]
+            if not stop():
+                submit(len(done))
     except BrokenProcessPool as error:
         if not stop():
             raise FlightError(

@@ -4,7 +4,9 @@ import functools
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from importlib.resources import files
 from ipaddress import ip_address
@@ -18,6 +20,7 @@ from mjspace.scenario.user_files import load_file
 GROUP = "mjspace.controllers"
 """The package of the laws that come with mjspace, and the entry points of those that do not."""
 _SCENARIOS = Path(str(files("mjspace.scenarios")))
+_NOTED: ContextVar[dict[str, Path] | None] = ContextVar("noted", default=None)
 
 
 def is_library(kind: str) -> bool:
@@ -40,6 +43,27 @@ def function_of(kind: str) -> str:
     if not (name.isascii() and name.isidentifier()):
         raise ValueError(f"{shortened(kind)!r}: write 'library.so:function'")
     return name
+
+
+@contextmanager
+def files_noted() -> Iterator[dict[str, Path]]:
+    """Yield the files that are looked up within the context, by the names they are given.
+
+    Those that come with mjspace are left out.
+    """
+    noted: dict[str, Path] = {}
+    before = _NOTED.set(noted)
+    try:
+        yield noted
+    finally:
+        _NOTED.reset(before)
+
+
+def note(name: str, path: Path) -> None:
+    """Note that a file, if it is one, is read within ``files_noted``, under that name."""
+    noted = _NOTED.get()
+    if noted is not None and path.is_file():
+        noted[name] = path
 
 
 class CommandLineText(str):
@@ -71,6 +95,7 @@ class Trust:
             return _SCENARIOS / name  # as where a scenario is based on one of them
         if not (self._trusts(name) or path.resolve().is_relative_to(self.folder.resolve())):
             raise ValueError(f"{name} is outside the scenario's folder: --trust allows that")
+        note(name, path)
         return path
 
     def library(self, kind: str) -> tuple[Path, str]:

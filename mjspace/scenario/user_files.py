@@ -126,7 +126,9 @@ def _data(tree: ast.Module, file: Path, folder: Path) -> Iterator[Path]:
             raise ValueError(f'{file}: {DATA_FILES}: write it out, as in ("table.csv",)')
         for name in names:
             place = file.parent / name
-            inside = place.resolve().is_relative_to(folder.resolve()) and ".." not in place.parts
+            inside = (
+                place.resolve().is_relative_to(folder.resolve()) and ".." not in Path(name).parts
+            )
             if not inside or not place.is_file():
                 raise ValueError(f"{file}: {DATA_FILES}: no file {name!r} in its folder")
             yield place

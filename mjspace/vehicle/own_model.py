@@ -13,7 +13,7 @@ import numpy as np
 from mjspace.errors import nearest
 from mjspace.scenario.model_source import KINDS, ModelSource, read_source, source_of
 from mjspace.scenario.plant import Roles
-from mjspace.scenario.trust import Trust
+from mjspace.scenario.trust import Trust, note
 from mjspace.vehicle import model_sensors
 from mjspace.vehicle import roles as recognition
 from mjspace.vehicle.roles import Recognized
@@ -52,7 +52,9 @@ def _source_of_spec(spec: Any, folder: Path) -> ModelSource:
     """Return a spec as XML, and the files that it names: its own assets, or of the ``folder``."""
     for element in (*spec.meshes, *spec.textures, *spec.hfields, *spec.skins):
         if element.file and element.file not in spec.assets:
-            spec.assets[element.file] = (folder / element.file).read_bytes()
+            path = folder / element.file
+            note(element.file, path)
+            spec.assets[element.file] = path.read_bytes()
     with _in_one_line():
         spec.compile()
         text = spec.to_xml()

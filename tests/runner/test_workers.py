@@ -56,6 +56,36 @@ def test_a_stopped_worker_begins_nothing() -> None:
     assert calls == []
 
 
+INTERRUPTED = """
+import signal
+from multiprocessing.popen_forkserver import Popen
+from mjspace.interrupts import ended_by_signals, on_signals
+from mjspace.runner import workers
+launch = Popen._launch
+def launched(popen, process):
+    launch(popen, process)
+    signal.raise_signal(signal.SIGINT)
+Popen._launch = launched
+with ended_by_signals(), on_signals() as stop:
+    list(workers.each([(exec, "pass")] * 4, stop, 4))
+"""
+
+
+@pytest.mark.skipif(workers._METHOD != "forkserver", reason="another process begins the workers")
+def test_workers_that_are_beginning_when_a_signal_comes_say_nothing() -> None:
+    """The first finds the semaphores of its parent gone."""
+    found = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=30
+    )
+    assert (found.returncode, found.stderr) == (130, "mjspace: interrupted\n")
+
+
+def test_every_call_is_made_though_a_pool_holds_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "_AHEAD", 2)
+    calls = [(int, str(number)) for number in range(7)]
+    assert sorted(workers.each(calls, processes=2)) == [(n, n) for n in range(7)]
+
+
 PARENT = f"""
 from mjspace.runner import workers
 list(workers.each([(exec, "print('up', flush=True); {SLEEP}")] * 4))
