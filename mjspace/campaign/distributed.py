@@ -17,7 +17,7 @@ from mjspace.campaign.flights import Flown, fly_numbers, keep_log, keeps, log_of
 from mjspace.campaign.members import Population
 from mjspace.campaign.places import write_whole
 from mjspace.campaign.same_bits import difference, facts
-from mjspace.errors import FlightError, InputError
+from mjspace.errors import FlightError, InputError, missing
 from mjspace.interrupts import Stop
 from mjspace.runner import scratch
 from mjspace.runner.output import LOG
