@@ -47,6 +47,11 @@ FACTS: dict[str, Any] = {
     "thruster_force": _RCS.of_each("thrust"),
     "ephemeris": ephemeris("inclined"),
 }
+DOUBLE_GIMBALS = {
+    "gimbal_axes": [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]] * 3,
+    "spin_axes": [[0.0, 0.0, 1.0]] * 3,
+}
+"""In place of the facts, for laws of two gimbals a wheel."""
 UNFLOWN = {
     "targets:SpacecraftTarget": {
         "target": {"kind": "relative_orbit:RelativeOrbit", "orbit_rate": 1e-3, "height": 9.0}
@@ -72,7 +77,8 @@ def gains_of(name: str, kind: type) -> dict[str, Any]:
     for scenario in scenarios():
         for component in (scenario.law, scenario.reference, scenario.estimator):
             if component is not None and component.kind == name:
-                return component.gains
+                own = DOUBLE_GIMBALS if name.startswith("attitude_momentum:") else {}
+                return component.gains | own
     if name in UNFLOWN:
         return dict(UNFLOWN[name])
     required = [

@@ -52,9 +52,10 @@ def whole(vehicle: plant.Vehicle) -> Array:
 
 
 @settings(max_examples=60, deadline=None)
-@given(root=matrices, positions=st.sampled_from([None, AWAY]))
+@given(root=matrices.map(lambda root: root.round(3)), positions=st.sampled_from([None, AWAY]))
 def test_any_gyrostat_inertia_is_what_mujoco_flies(root: Array, positions: Any) -> None:
-    # At least 2 kg m^2 about each axis leaves a bus once the wheels' share is taken off.
+    # At least 2 kg m^2 about each axis leaves a bus once the wheels' share is taken off. To MuJoCo
+    # axes that are within 1.4e-6 of the principal ones are those (mju_eig3): hence the rounding.
     wanted = 10.0 * root @ root.T + 2.0 * np.eye(3)
     wanted = (wanted + wanted.T) / 2.0
     with warnings.catch_warnings():

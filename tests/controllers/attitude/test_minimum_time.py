@@ -104,5 +104,5 @@ def test_unfit_tables_and_a_missing_solver_are_reported(monkeypatch: pytest.Monk
     with pytest.raises(ValueError, match="time: got 7 rows, should be 6, one more than of torque"):
         Planned(INERTIA, PERIOD, HALF.time, HALF.torque[1:])
     monkeypatch.setitem(sys.modules, "casadi", None)
-    with pytest.raises(ModuleNotFoundError, match=r"pip install mjspace\[planning\]"):
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'mjspace\[planning\]'"):
         minimum_time_slew(INERTIA, LIMIT, HALF_TURN)
