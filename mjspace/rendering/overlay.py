@@ -1,5 +1,6 @@
-"""The caption of a frame: scenario and law, time, and the flight's error."""
+"""What is written on a frame: its caption below, the legend of its arrows above."""
 
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -7,7 +8,6 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from mjspace.contract import Array
 from mjspace.rendering.video import Frame
 
 WHITE, GREY, SHADE = (255, 255, 255, 255), (200, 208, 220, 255), (0, 0, 0, 96)
@@ -31,16 +31,56 @@ def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> None:
     frame[top:] = np.asarray(band)
 
 
-def angle_text(angle: float) -> str:
-    """Return an angle [rad] in degrees: two decimals, or two digits below 0.01 deg."""
-    degrees = float(np.degrees(angle))
-    return f"{degrees:.2f} deg" if degrees >= 0.01 else f"{degrees:.2g} deg"
+def legend(frame: Frame, lines: Sequence[tuple[Sequence[float], str, str]]) -> None:
+    """Write lines into the upper left corner: each a color (red, green, blue; 0 to 1) of a letter
+    and the text after it."""
+    height, width = frame.shape[:2]
+    margin, size = round(0.035 * height), max(9, height // 36)
+    step = round(1.5 * size)
+    bottom, right = margin + step * len(lines), min(width, margin + 26 * size)
+    part = Image.fromarray(frame[:bottom, :right])  # a copy, of what changes
+    draw = ImageDraw.Draw(part)
+    for number, (color, letter, text) in enumerate(lines):
+        y = margin + step * number
+        bold, plain = _font("DejaVuSans-Bold", size), _font("DejaVuSans", size)
+        draw.text((margin, y), letter, _shade(color), bold, stroke_width=1, stroke_fill=(0, 0, 0))
+        after = margin + round(1.4 * size)
+        draw.text((after, y), text, GREY[:3], plain, stroke_width=1, stroke_fill=(0, 0, 0))
+    frame[:bottom, :right] = np.asarray(part)
 
 
-def path_text(position: Array, velocity: Array, error: Array) -> str:
-    """Return height [m], speed [m/s] and distance from the desired path [m], of vectors (3,)."""
-    speed, off = float(np.linalg.norm(velocity)), float(np.linalg.norm(error))
-    return f"height {position[2]:.1f} m, speed {speed:.2f} m/s, {off:.2f} m off its path"
+def letters(frame: Frame, written: Iterable[tuple[float, float, str, Sequence[float]]]) -> None:
+    """Write texts around places: in heights of the frame, from its middle to the right, from above.
+
+    Each has a color, red, green and blue from 0 to 1. Where two would cover each other, the later
+    one stands to the right.
+    """
+    height, width = frame.shape[:2]
+    size, taken = max(9, height // 34), list[tuple[int, int]]()
+    for across, down, text, color in written:
+        x, y = round(0.5 * width + across * height), round(down * height)
+        while any(abs(x - u) < size and abs(y - v) < size for u, v in taken):
+            x += size
+        taken.append((x, y))
+        left, right = max(x - 2 * size, 0), min(x + 2 * size, width)
+        top, bottom = max(y - size, 0), min(y + size, height)
+        if right <= left or bottom <= top:
+            continue
+        part = Image.fromarray(frame[top:bottom, left:right])  # a copy, of what changes
+        ImageDraw.Draw(part).text(
+            (x - left, y - top),
+            text,
+            _shade(color),
+            _font("DejaVuSans-Bold", size),
+            "mm",
+            stroke_width=max(1, size // 10),
+            stroke_fill=(0, 0, 0),
+        )
+        frame[top:bottom, left:right] = np.asarray(part)
+
+
+def _shade(color: Sequence[float]) -> tuple[int, ...]:
+    return tuple(round(255 * share) for share in color)
 
 
 @cache
