@@ -19,7 +19,8 @@ ENGINE = "engine_thrust"
 """The motor of an engine, at a site along which it pushes."""
 YELLOW = (1.0, 0.78, 0.24)
 """Of the trail and the velocity along it."""
-_OF_AXES, _OF_HULL = 2.0, 1.5  # the longest arrow, over the body axes, or over what has none
+_PREFIXES = (("", 1.0), ("m", 1e-3), ("u", 1e-6), ("n", 1e-9))
+_OF_AXES, _OF_HULL = 2.0, 1.2  # the longest arrow, over the body axes, or over what has none
 
 
 class Kind(NamedTuple):
@@ -73,8 +74,11 @@ class Arrows(NamedTuple):
     def legend(self, number: int) -> str:
         """Return what the legend says at a time, by its number."""
         size = self.kind.shown * float(np.linalg.norm(self.vectors[number]))
-        unit = self.kind.unit
-        return f"{self.kind.name} {size:.3g} {unit} (1 m: {self.scale:g} {unit})"
+        prefix, factor = next(
+            (each for each in _PREFIXES if self.scale >= 0.1 * each[1]), _PREFIXES[-1]
+        )
+        unit = f"{prefix}{self.kind.unit}"
+        return f"{self.kind.name} {size / factor:.3g} {unit} (1 m: {self.scale / factor:g} {unit})"
 
 
 def arrows_of(log: Log, law: str, model: Any, times: Array) -> list[Arrows]:
@@ -100,7 +104,7 @@ def arrows_of(log: Log, law: str, model: Any, times: Array) -> list[Arrows]:
 def longest(model: Any) -> float:
     """Return how long an arrow may be [m]: twice as long as the body axes of the model.
 
-    Of a model that does not draw any, half again as long as its bus reaches.
+    Of a model that does not draw any, somewhat longer than its bus reaches.
     """
     reach = np.linalg.norm(model.geom_pos, axis=1)
     axes = model.geom_group == AXES

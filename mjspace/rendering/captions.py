@@ -1,6 +1,7 @@
 """What the caption of a frame says: the time, and what matters of the flight then."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import repeat
 
 import numpy as np
 
@@ -33,13 +34,17 @@ def captions(log: Log, law: str, times: Array) -> Iterator[str]:
     port = _port(log)
     if flies_a_path(log):
         place, velocity, named = "position", "velocity", "distance"
-        if "altitude" in truth:
+        if is_lander(log):
             place, named = "altitude", "altitude"
         elif port is not None:
             place, velocity = f"{port}_position", f"{port}_velocity"
-        off = rows("position_error") if "position_error" in truth else (None for _ in times)
-        for at, moving, error in zip(rows(place), rows(velocity), off, strict=True):
-            yield path_text(named, at, moving, error)
+        of = ""
+        errors: Iterable[Array] = repeat(np.zeros(3), len(times))
+        if "position_error" in truth:
+            of, errors = _what_is_desired(log), rows("position_error")
+        for at, moving, error in zip(rows(place), rows(velocity), errors, strict=True):
+            text = path_text(named, at, moving)
+            yield f"{text}, {metres(error)} {of}" if of else text
     elif law in TURNING:
         for rate in rows("rate"):
             yield f"turns at {rate_text(rate)}"
@@ -50,8 +55,18 @@ def captions(log: Log, law: str, times: Array) -> Iterator[str]:
 
 def flies_a_path(log: Log) -> bool:
     """Tell whether a lander flew, or one spacecraft near another."""
-    own = {"altitude", "position_error"} & log.topics.get("/truth", {}).keys()
-    return bool(own) or _port(log) is not None
+    return is_lander(log) or "position_error" in log.topics["/truth"] or _port(log) is not None
+
+
+def is_lander(log: Log) -> bool:
+    """Tell whether the vehicle had ground below it."""
+    return {"altitude", "contact"} <= log.topics["/truth"].keys()
+
+
+def _what_is_desired(log: Log) -> str:
+    """Return what the position error is from: a path, or one place throughout."""
+    first, last = (log.nearest("/reference", at)["position"] for at in (log.start, log.end))
+    return "from its desired place" if np.array_equal(first, last) else "off its path"
 
 
 def _port(log: Log) -> str | None:
@@ -80,15 +95,17 @@ def rate_text(rate: Array) -> str:
     return f"{_number(float(np.degrees(np.linalg.norm(rate))))} deg/s"
 
 
-def path_text(named: str, place: Array, velocity: Array, error: Array | None) -> str:
-    """Return a distance, a speed [m/s] and the distance from the desired path [m].
+def metres(vector: Array) -> str:
+    """Return the length of a vector (n,) [m], from 10 km on in km."""
+    length = float(np.linalg.norm(vector))
+    if length >= 1e4:
+        return f"{1e-3 * length:.1f} km"
+    return f"{length:.2f} m" if length < 100.0 else f"{length:.1f} m"
 
-    Each is the norm of a vector; the first of ``place`` [m], (n,), is ``named`` so.
-    """
-    away = float(np.linalg.norm(place))
-    distance = f"{away:.2f} m" if away < 100.0 else f"{away:.1f} m"
-    text = f"{named} {distance}, speed {np.linalg.norm(velocity):.2f} m/s"
-    return text if error is None else f"{text}, {np.linalg.norm(error):.2f} m off its path"
+
+def path_text(named: str, place: Array, velocity: Array) -> str:
+    """Return the lengths of ``place`` [m], which is ``named`` so, and of a velocity [m/s]."""
+    return f"{named} {metres(place)}, speed {np.linalg.norm(velocity):.2f} m/s"
 
 
 def _number(value: float) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from mjspace.contract import Array
 from mjspace.log.reader import Log
 from mjspace.rendering.arrows import arrows_of
-from mjspace.rendering.captions import flies_a_path
+from mjspace.rendering.captions import flies_a_path, is_lander
 from mjspace.rendering.decoration import TRAIL_POINTS
 from mjspace.rendering.scene import Decoration
 
@@ -43,9 +43,7 @@ def _path(log: Log, end: float) -> tuple[Array, Array]:
 
 def _site(log: Log) -> Array | None:
     """Return where the desired path of a lander ends, x and y (2,) [m]."""
-    if "altitude" not in log.topics.get("/truth", {}):
-        return None
-    if "position" not in log.topics.get("/reference", {}):
+    if not is_lander(log) or "position" not in log.topics.get("/reference", {}):
         return None
     end: Array = log.nearest("/reference", log.end)["position"][:2]
     return end

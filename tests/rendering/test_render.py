@@ -340,10 +340,11 @@ def descent(tmp_path_factory: pytest.TempPathFactory) -> Log:
 
 
 def test_a_landers_caption_tells_of_its_path(descent: Log) -> None:
-    text = wording.path_text("altitude", np.array([30.04]), np.array([0.3, 0.0, -0.4]), np.ones(3))
-    assert text == "altitude 30.04 m, speed 0.50 m/s, 1.73 m off its path"
+    text = wording.path_text("altitude", np.array([30.04]), np.array([0.3, 0.0, -0.4]))
+    assert text == "altitude 30.04 m, speed 0.50 m/s"
+    assert wording.metres(np.array([3e4, 0.0, 4e4])) == "50.0 km"
     first, last = captions(descent, "lander:VariableStructure", np.array([0.0, 0.5]))
-    assert first.startswith("altitude 1005.6 m, speed 26.93 m/s, 0.0")
+    assert first.startswith("altitude 1005.6 m, speed 26.93 m/s, 0.00 m off its path")
     assert last.startswith("altitude 1000.")  # 10 m/s downwards, for half a second
 
 
@@ -381,6 +382,8 @@ def test_an_arrow_is_as_long_as_its_scale_says(pictured_log: Path, stage: Stage)
     logged = log.nearest("/command", 0.5)["torque"]
     np.testing.assert_allclose(torque.length(1) * torque.scale, logged)
     assert f"{np.linalg.norm(logged):.3g} N m (1 m: {torque.scale:g} N m)" in torque.legend(1)
+    small = torque._replace(vectors=1e-6 * torque.vectors, scale=1e-6 * torque.scale)
+    assert f"{np.linalg.norm(logged):.3g} uN m (1 m: {torque.scale:g} uN m)" in small.legend(1)
     for drawn in (torque, momentum):
         lengths = [np.linalg.norm(drawn.length(number)) for number in (0, 1)]
         # A scale of 1, 2 or 5: at most 2.5 times too small.
