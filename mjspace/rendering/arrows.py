@@ -63,7 +63,7 @@ class Arrows(NamedTuple):
     vectors: Array
     """At each time, SI, shape (n, 3)."""
     scale: float
-    """What an arrow of one metre stands for, in the unit that is shown: 1, 2 or 5 times a power
+    """What an arrow of one metre stands for, in the unit that is shown: 1, 2, 3 or 5 times a power
     of ten."""
 
     def length(self, number: int) -> Array:
@@ -115,9 +115,11 @@ def longest(model: Any) -> float:
 
 
 def rounded_up(value: float) -> float:
-    """Return the least of 1, 2 or 5 times a power of ten that is not below a positive value."""
+    """Return the least of 1, 2, 3 or 5 times a power of ten that is not below a positive value."""
     power = 10.0 ** np.floor(np.log10(value))
-    return float(next(n * power for n in (1.0, 2.0, 5.0, 10.0) if n * power >= value * (1 - 1e-9)))
+    return float(
+        next(n * power for n in (1.0, 2.0, 3.0, 5.0, 10.0) if n * power >= value * (1 - 1e-9))
+    )
 
 
 def _has_engine(model: Any) -> bool:

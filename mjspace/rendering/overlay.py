@@ -16,7 +16,8 @@ WHITE, GREY, SHADE = (255, 255, 255, 255), (200, 208, 220, 255), (0, 0, 0, 96)
 def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> None:
     """Write two lines of text into each lower corner of the frame, the upper ones larger.
 
-    Font sizes scale with the frame's height, down to the smallest that is legible.
+    Font sizes scale with the frame's height, down to the smallest that is legible. The lower left
+    line is left out where there is no room for it.
     """
     height, width = frame.shape[:2]
     margin, large, small = round(0.035 * height), max(11, height // 25), max(9, height // 36)
@@ -25,9 +26,12 @@ def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> None:
     band = Image.fromarray(frame[top:])  # a copy, of the rows that change
     draw = ImageDraw.Draw(band, "RGBA")
     draw.rectangle((0, 0, width, height), fill=SHADE)
+    plain = _font("DejaVuSans", small)
+    if plain.getlength(left[1]) + plain.getlength(right[1]) > width - 3 * margin:
+        left = left[0], ""
     for x, anchor, lines in ((margin, "ls", left), (width - margin, "rs", right)):
         draw.text((x, upper - top), lines[0], WHITE, _font("DejaVuSans-Bold", large), anchor)
-        draw.text((x, lower - top), lines[1], GREY, _font("DejaVuSans", small), anchor)
+        draw.text((x, lower - top), lines[1], GREY, plain, anchor)
     frame[top:] = np.asarray(band)
 
 
