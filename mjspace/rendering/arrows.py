@@ -1,5 +1,6 @@
 """Which vectors of a flight are drawn as arrows, and at which scale."""
 
+import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -19,6 +20,7 @@ ENGINE = "engine_thrust"
 """The motor of an engine, at a site along which it pushes."""
 YELLOW = (1.0, 0.78, 0.24)
 """Of the trail and the velocity along it."""
+_AXIS = re.compile("axis_[xyz]$")
 _PREFIXES = (("", 1.0), ("m", 1e-3), ("u", 1e-6), ("n", 1e-9))
 _OF_AXES, _OF_HULL = 2.0, 1.2  # the longest arrow, over the body axes, or over what has none
 
@@ -107,11 +109,17 @@ def longest(model: Any) -> float:
     Of a model that does not draw any, somewhat longer than its bus reaches.
     """
     reach = np.linalg.norm(model.geom_pos, axis=1)
-    axes = model.geom_group == AXES
-    if axes.any():
+    if axes := list(body_axes(model)):
         return _OF_AXES * float((reach + model.geom_size[:, 1])[axes].max())
     hull = (model.geom_bodyid == bus_id(model)) & (model.geom_group != PLUME)
     return _OF_HULL * float((reach + model.geom_rbound)[hull].max(initial=0.0)) or 1.0
+
+
+def body_axes(model: Any) -> dict[int, str]:
+    """Return the letters of the body axes that the model draws, by geom: of ``axis_x`` x."""
+    axes = np.flatnonzero(model.geom_group == AXES).tolist()
+    names = {geom: model.geom(geom).name for geom in axes if model.geom_pos[geom].any()}
+    return {geom: name[-1] for geom, name in names.items() if _AXIS.search(name)}
 
 
 def rounded_up(value: float) -> float:

@@ -9,7 +9,7 @@ from mjspace.contract import Array
 from mjspace.log.reader import Log
 from mjspace.rendering.arrows import arrows_of
 from mjspace.rendering.captions import flies_a_path, is_lander
-from mjspace.rendering.decoration import TRAIL_POINTS
+from mjspace.rendering.markers import TRAIL_POINTS
 from mjspace.rendering.scene import Decoration
 
 Lines = list[tuple[tuple[float, float, float], str, str]]

@@ -9,8 +9,8 @@ import numpy as np
 from mjspace import attitude
 from mjspace.contract import Array
 from mjspace.environment.orbit import Orbit, orbit_position
-from mjspace.rendering import decoration
-from mjspace.rendering.arrows import AXES, ENGINE, Kind, longest
+from mjspace.rendering import markers
+from mjspace.rendering.arrows import AXES, ENGINE, Kind, body_axes, longest
 from mjspace.rendering.plume import Plume
 from mjspace.vehicle.indices import bus_id
 
@@ -51,8 +51,8 @@ class Stage:
         if camera not in names:
             raise ValueError(f"no camera {camera!r}: have {', '.join(names)}")
         self.model = model
-        self.scene = mujoco.MjvScene(model, model.ngeom + _SPARE_GEOMS + decoration.MOST_GEOMS)
-        self._letters: list[decoration.Letter] = []
+        self.scene = mujoco.MjvScene(model, model.ngeom + _SPARE_GEOMS + markers.MOST_GEOMS)
+        self._letters: list[markers.Letter] = []
         self._data = mujoco.MjData(model)
         self._perturb, self._option = mujoco.MjvPerturb(), mujoco.MjvOption()
         self._option.geomgroup[AXES] = 1
@@ -70,7 +70,7 @@ class Stage:
         self._planet = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "planet")
         self._below = model.geom_pos[self._planet].copy(), model.geom_quat[self._planet].copy()
         self._plume = Plume(model)
-        self._longest = longest(model)
+        self._longest, self._named = longest(model), body_axes(model)
         self._ground = mujoco.mj_name2id(model, _GEOM, _GROUND)
         engine = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, ENGINE)
         self._engine = int(model.actuator_trnid[engine, 0]) if engine >= 0 else -1
@@ -115,7 +115,7 @@ class Stage:
     def written(self) -> Iterator[tuple[float, float, str, Sequence[float]]]:
         """Yield each letter in the frame: where, from the middle and from above, and its color."""
         for letter in self._letters:
-            place = decoration.in_frame(self.scene, letter.place)
+            place = markers.in_frame(self.scene, letter.place)
             if place is not None:
                 yield *place, letter.text, letter.color
 
@@ -152,26 +152,29 @@ class Stage:
     def _decorate(self, decorated: Decoration, bus: Array) -> None:
         model, data, scene = self.model, self._data, self.scene
         origin = data.xpos[bus_id(model)].copy()
-        for geom in self._axes:
+        for geom, name in self._named.items():
             along = attitude.rotate(bus, model.geom_pos[geom])
             length = float(np.linalg.norm(along)) + float(model.geom_size[geom, 1])
-            name, color = model.geom(geom).name[-1:], model.geom_rgba[geom]
-            self._letters.append(decoration.axis_letter(origin, along, length, name, color))
+            color = model.geom_rgba[geom]
+            self._letters.append(markers.axis_letter(origin, along, length, name, color))
         for kind, vector in decorated.arrows:
             if kind.frame == "body":
                 vector = attitude.rotate(bus, vector)
             elif kind.frame == "engine":
                 vector = data.site_xmat[self._engine].reshape(3, 3) @ vector
-            self._letters += decoration.add_arrow(
+            self._letters += markers.add_arrow(
                 scene, origin, vector, self._longest, kind.color, kind.letter
             )
         if len(decorated.trail):
-            decoration.add_trail(scene, np.concatenate([decorated.trail, origin[None]]))
-        if decorated.site is not None and self._ground >= 0:
-            self._letters += decoration.add_site(scene, self._on_ground(decorated.site))
+            markers.add_trail(scene, np.concatenate([decorated.trail, origin[None]]))
+        site = None if decorated.site is None else self._on_ground(decorated.site)
+        if site is not None:
+            self._letters += markers.add_site(scene, site)
 
-    def _on_ground(self, place: Array) -> Array:
-        """Return the point (3,) of the ground at x and y (2,)."""
+    def _on_ground(self, place: Array) -> Array | None:
+        """Return the point (3,) of the ground at x and y (2,); None where there is none."""
+        if self._ground < 0:
+            return None
         above, down = np.array([*place, _HIGH]), np.array([0.0, 0.0, -1.0])
         ground = self._ground
         if self.model.geom_type[ground] == mujoco.mjtGeom.mjGEOM_HFIELD:
@@ -180,4 +183,4 @@ class Stage:
             normal = self._data.geom_xmat[ground].reshape(3, 3)[:, 2]
             depth = (above - self._data.geom_xpos[ground]) @ normal / normal[2]
         point: Array = above + depth * down
-        return point
+        return point if depth >= 0.0 else None

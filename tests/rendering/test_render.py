@@ -22,8 +22,8 @@ from mjspace.errors import NoRendererError
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering import captions as wording
-from mjspace.rendering import decoration, overlay
-from mjspace.rendering.arrows import arrows_of, longest, rounded_up
+from mjspace.rendering import markers, overlay
+from mjspace.rendering.arrows import arrows_of, body_axes, longest, rounded_up
 from mjspace.rendering.captions import captions, time_text
 from mjspace.rendering.decorations import decorations
 from mjspace.rendering.offscreen import Canvas
@@ -402,6 +402,18 @@ def test_an_arrow_is_as_long_as_its_scale_says(pictured_log: Path, stage: Stage)
     assert [rounded_up(value) for value in (0.011, 0.2, 3.0, 5.1)] == [0.02, 0.2, 3.0, 10.0]
 
 
+def test_axes_alone_have_letters() -> None:
+    """Group 3 is often that of collision geoms in models of others."""
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><worldbody><body><freejoint/>
+          <geom size=".2" group="3"/><geom name="box" size=".2" pos="1 0 0" group="3"/>
+          <geom name="own_axis_y" type="capsule" size=".01" fromto="0 0 0 0 1 0" group="3"/>
+        </body></worldbody></mujoco>"""
+    )
+    assert body_axes(model) == {2: "y"}
+    assert longest(model) == pytest.approx(2.0)
+
+
 @needs_opengl
 def test_a_letter_is_where_the_arrow_ends(stage: Stage, row: Any) -> None:
     """The tip that MuJoCo draws is where we compute the letter's place, but for its distance."""
@@ -410,10 +422,10 @@ def test_a_letter_is_where_the_arrow_ends(stage: Stage, row: Any) -> None:
     with Canvas(stage.model, (640, 360)) as canvas:
         before = canvas.draw(stage.scene).astype(int)
         up = 2.5 * stage.scene.camera[0].up.astype(float)
-        (letter,) = decoration.add_arrow(stage.scene, row[1:4], up, 2.5, (1.0, 0.0, 1.0), "τ")
+        (letter,) = markers.add_arrow(stage.scene, row[1:4], up, 2.5, (1.0, 0.0, 1.0), "τ")
         after = canvas.draw(stage.scene).astype(int)
     y, x = np.nonzero(np.abs(after - before).max(axis=2) > 60)
-    place = decoration.in_frame(stage.scene, letter.place)
+    place = markers.in_frame(stage.scene, letter.place)
     assert place is not None
     tip = y.argmin()
     # 6 % of the arrow's length beyond it, 7 pixels here.
