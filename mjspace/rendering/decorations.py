@@ -1,6 +1,7 @@
 """What is drawn around a vehicle at each instant of a log, and what the legend says of it."""
 
 from collections.abc import Iterator
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ def _path(log: Log, end: float) -> tuple[Array, Array]:
     if not flies_a_path(log):
         return np.empty(0), np.empty((0, 3))
     periods = max(1.0, (end - log.start) / log.control_period)
-    every = max(1, round(periods / (TRAIL_POINTS * log.every["/truth"])))
+    every = ceil(periods / (TRAIL_POINTS * log.every["/truth"]))
     rows = log.read("/truth", ["position"], end=end, every=every)
     return rows["time"], rows["position"]
 

@@ -36,8 +36,10 @@ def write(frame: Frame, left: tuple[str, str], right: tuple[str, str]) -> None:
 
 
 def legend(frame: Frame, lines: Sequence[tuple[Sequence[float], str, str]]) -> None:
-    """Write lines into the upper left corner: each a color (red, green, blue; 0 to 1) of a letter
-    and the text after it."""
+    """Write lines into the upper left corner.
+
+    Each is the color of a letter (red, green and blue from 0 to 1), the letter, and a text.
+    """
     height, width = frame.shape[:2]
     margin, size = round(0.035 * height), max(9, height // 36)
     step = round(1.5 * size)

@@ -25,11 +25,11 @@ _GROUND, _HIGH = "site_ground", 1e4  # m: above any hill
 class Decoration(NamedTuple):
     """What is drawn around the vehicle at an instant."""
 
-    arrows: Sequence[tuple[Kind, Array]] = ()
+    arrows: Sequence[tuple[Kind, Array]]
     """Each with its vector (3,) [m], in its kind's axes."""
-    trail: Array = np.empty((0, 3))
+    trail: Array
     """Where the vehicle was [m], inertial axes, (n, 3)."""
-    site: Array | None = None
+    site: Array | None
     """Where it is to land, x and y (2,) [m]."""
 
 
