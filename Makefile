@@ -1,7 +1,7 @@
 # The set-up happens by itself, once, and again when what it reads changes.
 bin := .venv/bin
 
-.PHONY: run test flights attack mutation lint format docs validation constraints clean
+.PHONY: run test flights attack mutation lint format docs gallery validation constraints clean
 
 seed = 1
 
@@ -38,6 +38,10 @@ format: .venv/dev.done
 # The documentation site, in build/site; any warning, such as a broken link, is an error.
 docs: .venv/dev.done
 	NO_MKDOCS_2_WARNING=1 $(bin)/mkdocs build -q --strict
+
+# docs/gallery.md and its pictures, from the flights of every scenario, in build/gallery.
+gallery: .venv/dev.done
+	$(bin)/python tools/gallery.py
 
 # What docs/validation.md says, measured again; Basilisk and its packages live apart from ours.
 validation: .venv/dev.done build/basilisk.done

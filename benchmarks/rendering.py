@@ -2,8 +2,8 @@
 
 ``MUJOCO_GL=egl python benchmarks/rendering.py [SECONDS]``: of four seconds of a satellite and of a
 lander, 960 x 540 pixels at 25 frames a second; medians of paired runs in one process. The bare loop
-has neither caption nor desired axes, its states are in memory, and it has to be told to do without
-a display, as ours has not.
+has no caption, desired axes, arrows or letters, its states are in memory, and it has to be told to
+do without a display, as ours has not.
 """
 
 import gzip
@@ -18,8 +18,8 @@ from timing import Run, head, paired, ratio, row
 
 import mjspace
 from mjspace.log.reader import Log
+from mjspace.rendering.arrows import AXES
 from mjspace.rendering.render import render
-from mjspace.rendering.scene import AXES
 from mjspace.rendering.video import Video
 from mjspace.vehicle.vehicle import from_mjb
 

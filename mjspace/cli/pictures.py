@@ -18,6 +18,12 @@ def render(
     rate: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds for each second.")] = 1.0,
     at: Annotated[float | None, typer.Option(help="Time of a still [s]; else the end.")] = None,
+    arrows: Annotated[
+        bool,
+        typer.Option(
+            "--arrows/--no-arrows", help="Arrows, letters at the axes, trail and landing site."
+        ),
+    ] = True,
     quiet: Quiet = False,
 ) -> None:
     """Render a log to a video or a picture, offscreen."""
@@ -36,6 +42,7 @@ def render(
             rate=rate,
             speed=speed,
             at=at,
+            arrows=arrows,
             progress=progress,
         )
     print(output)

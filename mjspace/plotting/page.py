@@ -81,8 +81,8 @@ def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:
         wspace=0.14,
     )
     for axes, one in zip(grid.flat, found, strict=False):
-        colors = _colors(one)
-        _draw(axes, one, colors)
+        colors = line_colors(one)
+        draw(axes, one, colors)
         for bound in bounds(one.panel, scenario.checks, log):
             axes.margins(y=0.16)  # room for the bound's text
             _mark(axes, bound, colors[bound.component if one.panel.part is None else 0])
@@ -96,7 +96,7 @@ def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:
             transform=axes.get_xaxis_transform(),
             clip_on=False,
         )
-    unit = _scale_time(grid.flat[0], log)
+    unit = scale_time(grid.flat[0], log)
     for axes in grid.flat[len(found) :]:
         axes.set_axis_off()
     for axes in grid.flat[max(len(found) - 2, 0) : len(found)]:
@@ -106,7 +106,7 @@ def figure(log: Log | Path | str, signals: Sequence[str] = ()) -> Figure:
     return page
 
 
-def _scale_time(axes: Any, log: Log) -> str:
+def scale_time(axes: Any, log: Log) -> str:
     """Set the limits and the ticks of an axis of time, and return its unit."""
     span = log.end - log.start
     unit, seconds = next(each for each in TIMES if span >= each[2])[:2]
@@ -119,12 +119,14 @@ def _scale_time(axes: Any, log: Log) -> str:
     return str(unit)
 
 
-def _colors(one: Curves) -> list[str]:
+def line_colors(one: Curves) -> list[str]:
+    """Return a color for each line of a panel."""
     count = one.value.shape[1]
     return [INK] if count == 1 else [COLORS[i % len(COLORS)] for i in range(count)]
 
 
-def _draw(axes: Any, one: Curves, colors: Sequence[str]) -> None:
+def draw(axes: Any, one: Curves, colors: Sequence[str]) -> None:
+    """Draw a panel: its lines, those desired of them, its title and the legend."""
     panel, count = one.panel, len(colors)
     if panel.lanes:
         _draw_lanes(axes, one)

@@ -13,9 +13,12 @@ from mjspace.errors import whole_or_none
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering import overlay
+from mjspace.rendering.captions import captions, time_text
+from mjspace.rendering.decorations import Lines, decorations
 from mjspace.rendering.flown_model import flown_model
 from mjspace.rendering.offscreen import Canvas
-from mjspace.rendering.scene import Stage
+from mjspace.rendering.sampling import nearest_rows
+from mjspace.rendering.scene import Decoration, Stage
 from mjspace.rendering.video import Frame, Video
 
 _LARGEST = 8192  # pixels: 5 GB and 17 s for a still, drawn in software
@@ -32,14 +35,16 @@ def render(
     rate: float = 25.0,
     speed: float = 1.0,
     at: float | None = None,
+    arrows: bool = True,
     progress: Callable[[int, int], None] = lambda drawn, count: None,
 ) -> None:
     """Draw a log: a video where ``output`` ends in .mp4, a still where it ends in .png.
 
     A video has ``rate`` frames per second and shows ``speed`` simulated seconds per second, from
     the first instant of the log to the last (to within a frame). A still shows the time ``at`` [s],
-    by default the end. ``size`` is (width, height) in pixels; ``progress`` is called
-    after each frame of a video with how many are drawn, and of how many.
+    by default the end. ``size`` is (width, height) in pixels. Without ``arrows`` there are neither
+    these nor letters at the axes, trail and landing site. ``progress`` is called after each frame
+    of a video with how many are drawn, and of how many.
 
     Raises:
         ValueError: an unknown file ending or camera, an odd size of a video, a rate or speed that
@@ -59,7 +64,7 @@ def render(
         )
     if output.suffix == ".png":
         times: Array = np.array([_still_time(log, at)])
-        (frame,) = frames_at(log, times, camera, size)
+        (frame,) = frames_at(log, times, camera, size, arrows)
         with whole_or_none(output) as file:
             Image.fromarray(frame).save(file, format="png")
         return
@@ -73,34 +78,9 @@ def render(
     count = int((log.end - log.start) / period + 1e-9) + 1
     times = np.linspace(log.start, log.start + period * (count - 1), count)
     with Video(output, size, rate) as video:
-        for drawn, frame in enumerate(frames_at(log, times, camera, size), 1):
+        for drawn, frame in enumerate(frames_at(log, times, camera, size, arrows), 1):
             video.write(frame)
             progress(drawn, count)
-
-
-def nearest_rows(log: Log, topic: str, field: str, times: Array) -> Iterator[Array]:
-    """Yield the field's value logged nearest to each of the ascending ``times`` (n,) [s].
-
-    The log is read once, with one block of it in memory.
-
-    Raises:
-        ValueError: the log does not have the topic or field, or no row near the times.
-    """
-    margin = log.control_period * log.every[topic]
-    stamps, rows, done = np.empty(0), np.empty((0, *log.shape(topic, field))), 0
-    start, end = max(times[0] - margin, 0.0), times[-1] + margin
-    for block in log.blocks(topic, [field], start=start, end=end):
-        # The last row so far may be nearer to a time than the first one of this block.
-        stamps = np.concatenate([stamps[-1:], block["time"]])
-        rows = np.concatenate([rows[-1:], block[field]])
-        due = int(np.searchsorted(times, stamps[-1], side="right"))
-        for time in times[done:due]:
-            yield rows[np.abs(stamps - time).argmin()]
-        done = due
-    if not len(stamps):
-        raise ValueError(f"{log.path} has no {topic} near {times[0]:g} s")
-    for _ in times[done:]:
-        yield rows[-1]
 
 
 def _still_time(log: Log, at: float | None) -> float:
@@ -111,7 +91,9 @@ def _still_time(log: Log, at: float | None) -> float:
     return at
 
 
-def frames_at(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Iterator[Frame]:
+def frames_at(
+    log: Log, times: Array, camera: str, size: tuple[int, int], arrows: bool = True
+) -> Iterator[Frame]:
     """Yield the picture of a log at each of the ascending ``times`` (n,) [s], as ``render`` does.
 
     Raises:
@@ -119,21 +101,29 @@ def frames_at(log: Log, times: Array, camera: str, size: tuple[int, int]) -> Ite
         NoRendererError: this machine cannot render; the message says what to install.
     """
     scenario = scenario_of(log)
-    stage = Stage(flown_model(log, scenario), camera, scenario.environment.orbit)
-    left = scenario.name, scenario.law.kind
+    model = flown_model(log, scenario)
+    stage = Stage(model, camera, scenario.environment.orbit)
+    law = scenario.law.kind
+    around: Iterable[tuple[Decoration | None, Lines]] = repeat((None, []), len(times))
+    if arrows:
+        around = decorations(log, law, model, times)
     with Canvas(stage.model, size) as canvas:
-        for time, physics, desired, pulses, thrust, caption in zip(
+        for time, physics, desired, pulses, thrust, caption, (decorated, lines) in zip(
             times,
             nearest_rows(log, "/state", "physics", times),
             nearest_rows(log, "/reference", "attitude", times),
             _pulses(log, times),
             shares_of_thrust(log, scenario.plant.engine, times),
-            captions(log, times),
+            captions(log, law, times),
+            around,
             strict=True,
         ):
-            stage.set(float(time), physics, desired, pulses, thrust)
+            stage.set(float(time), physics, desired, pulses, thrust, decorated)
             frame = canvas.draw(stage.scene)
-            overlay.write(frame, left, (f"{time:.2f} s", caption))
+            now = time_text(float(time), log.end - log.start)
+            overlay.letters(frame, stage.written())
+            overlay.write(frame, (scenario.name, law), (now, caption))
+            overlay.legend(frame, lines)
             yield frame
 
 
@@ -156,17 +146,3 @@ def shares_of_thrust(log: Log, engine: Any, times: Array) -> Iterator[float]:
     else:
         for thrust in nearest_rows(log, "/truth", "thrust", times):
             yield float(thrust[0]) / engine.thrust_max
-
-
-def captions(log: Log, times: Array) -> Iterator[str]:
-    """Yield the caption's text at each time: path and its error, or else the attitude error."""
-
-    def truth(field: str) -> Iterator[Array]:
-        return nearest_rows(log, "/truth", field, times)
-
-    if "position_error" in log.topics.get("/truth", ()):
-        for row in zip(truth("position"), truth("velocity"), truth("position_error"), strict=True):
-            yield overlay.path_text(*row)
-    else:
-        for error in truth("attitude_error"):
-            yield f"attitude error {overlay.angle_text(float(error[0]))}"

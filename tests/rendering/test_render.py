@@ -4,6 +4,7 @@ import gzip
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +21,17 @@ from mjspace.environment.orbit import orbit_position
 from mjspace.errors import NoRendererError
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
-from mjspace.rendering import overlay
+from mjspace.rendering import captions as wording
+from mjspace.rendering import markers, overlay
+from mjspace.rendering.arrows import arrows_of, body_axes, longest, rounded_up
+from mjspace.rendering.captions import captions, time_text
+from mjspace.rendering.decorations import decorations
 from mjspace.rendering.offscreen import Canvas
-from mjspace.rendering.render import captions, frames_at, nearest_rows, render, shares_of_thrust
+from mjspace.rendering.render import frames_at, render, shares_of_thrust
+from mjspace.rendering.sampling import nearest_rows
 from mjspace.rendering.scene import Stage
 from mjspace.rendering.video import Frame, Video
+from mjspace.scenario.trust import controllers
 from mjspace.vehicle.vehicle import from_mjb
 
 SIZE = 320, 180
@@ -50,7 +57,7 @@ def still(pictured_log: Path, tmp_path_factory: pytest.TempPathFactory) -> Calla
     def draw(at: float, camera: str = "chase") -> Pixels:
         path = folder / f"{camera}-{at}.png"
         if not path.exists():
-            render(pictured_log, path, camera=camera, size=SIZE, at=at)
+            render(pictured_log, path, camera=camera, size=SIZE, at=at, arrows=False)
         return np.asarray(Image.open(path)).astype(np.int64)
 
     return draw
@@ -109,11 +116,11 @@ def test_cameras_see_different_things(still: Callable[..., Pixels]) -> None:
 def test_the_caption_says_when_and_how_well(
     pictured_log: Path, still: Callable[..., Pixels]
 ) -> None:
-    error = float(Log(pictured_log).nearest("/truth", 0.5)["attitude_error"].item())
+    (caption,) = captions(Log(pictured_log), "contraction:Adaptive", np.array([0.5]))
     written = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     lines = (
         ("contraction-adaptive", "contraction:Adaptive"),
-        ("0.50 s", f"attitude error {overlay.angle_text(error)}"),
+        ("0.50 s", caption),
     )
     overlay.write(written, *lines)
     ink = written.min(axis=2) > 195  # the inside of letters, where nothing shines through
@@ -136,6 +143,17 @@ def test_each_text_of_the_caption_is_in_its_corner(changed: int) -> None:
     _, x = np.nonzero((written(texts) != written(other)).any(axis=2))
     assert len(x)
     assert ((x < 160) == (changed < 2)).all()
+
+
+def test_the_name_of_a_law_gives_way_to_a_long_caption() -> None:
+    def written(law: str, caption: str) -> Pixels:
+        frame = np.zeros((180, 320, 3), np.uint8)
+        overlay.write(frame, ("name", law), ("1.00 s", caption))
+        return frame.astype(np.int64)
+
+    assert (written("lander:VariableStructure", "short") != written("", "short")).any()
+    long = "altitude 550.3 m, speed 18.95 m/s, 6.62 m off its path"
+    assert (written("lander:VariableStructure", long) == written("", long)).all()
 
 
 @needs_opengl
@@ -166,7 +184,7 @@ def test_up_is_up_and_right_is_right() -> None:
     ("degrees", "text"), [(0.0, "0 deg"), (1.2e-7, "1.2e-07 deg"), (120.0, "120.00 deg")]
 )
 def test_angles_are_in_degrees(degrees: float, text: str) -> None:
-    assert overlay.angle_text(float(np.radians(degrees))) == text
+    assert wording.angle_text(float(np.radians(degrees))) == text
 
 
 def test_wanted_axes_stand_where_the_body_ought_to_be(stage: Stage, row: Any) -> None:
@@ -334,14 +352,119 @@ def descent(tmp_path_factory: pytest.TempPathFactory) -> Log:
 
 
 def test_a_landers_caption_tells_of_its_path(descent: Log) -> None:
-    text = overlay.path_text(np.array([1.0, 2.0, 30.04]), np.array([0.3, 0.0, -0.4]), np.ones(3))
-    assert text == "height 30.0 m, speed 0.50 m/s, 1.73 m off its path"
-    times = np.array([0.0, 0.5])
-    rows = descent.read("/truth", ["position", "velocity", "position_error"])
-    fields = rows["position"], rows["velocity"], rows["position_error"]
-    wanted = [overlay.path_text(*(field[i] for field in fields)) for i in (0, -1)]
-    assert list(captions(descent, times)) == wanted
-    assert wanted[0].startswith("height 1003.8 m, speed 26.93 m/s, 0.0")
+    text = wording.path_text("altitude", np.array([30.04]), np.array([0.3, 0.0, -0.4]))
+    assert text == "altitude 30.04 m, speed 0.50 m/s"
+    assert wording.metres(np.array([3e4, 0.0, 4e4])) == "50.0 km"
+    first, last = captions(descent, "lander:VariableStructure", np.array([0.0, 0.5]))
+    assert first.startswith("altitude 1005.6 m, speed 26.93 m/s, 0.00 m off its path")
+    assert last.startswith("altitude 1000.")  # 10 m/s downwards, for half a second
+
+
+def test_the_caption_of_a_satellite_is_its_error_or_only_its_rate(pictured_log: Path) -> None:
+    log, half = Log(pictured_log), np.array([0.5])
+    truth = log.nearest("/truth", 0.5)
+    error = wording.angle_text(truth["attitude_error"].item())
+    turns = wording.rate_text(truth["rate"])
+    assert list(captions(log, "contraction:Adaptive", half)) == [
+        f"attitude error {error}, rate {turns}"
+    ]
+    assert list(captions(log, "coast:Coast", half)) == [f"turns at {turns}"]
+    assert wording.rate_text(np.radians([0.0, 3.0, 4.0])) == "5.00 deg/s"
+
+
+@pytest.mark.parametrize("kind", sorted(wording.TURNING))
+def test_laws_that_leave_the_attitude_alone_exist(kind: str) -> None:
+    module, _, law = kind.partition(":")
+    assert hasattr(import_module(controllers()[module]), law)
+
+
+@pytest.mark.parametrize(
+    ("time", "span", "text"),
+    [(59.9, 599.0, "59.90 s"), (61.2, 600.0, "1 min 01 s"), (86399.0, 86400.0, "23 h 59 min")],
+)
+def test_the_time_of_a_long_flight_is_in_minutes_or_hours(
+    time: float, span: float, text: str
+) -> None:
+    assert time_text(time, span) == text
+
+
+def test_an_arrow_is_as_long_as_its_scale_says(pictured_log: Path, stage: Stage) -> None:
+    log, times = Log(pictured_log), np.array([0.1, 0.5])
+    torque, momentum = arrows_of(log, "contraction:Adaptive", stage.model, times)
+    logged = log.nearest("/command", 0.5)["torque"]
+    np.testing.assert_allclose(torque.length(1) * torque.scale, logged)
+    assert f"{np.linalg.norm(logged):.3g} N m (1 m: {torque.scale:g} N m)" in torque.legend(1)
+    small = torque._replace(vectors=1e-6 * torque.vectors, scale=1e-6 * torque.scale)
+    assert f"{np.linalg.norm(logged):.3g} uN m (1 m: {torque.scale:g} uN m)" in small.legend(1)
+    for drawn in (torque, momentum):
+        lengths = [np.linalg.norm(drawn.length(number)) for number in (0, 1)]
+        # A scale of 1, 2, 3 or 5: at most twice too small.
+        assert 0.5 * longest(stage.model) <= max(lengths) <= longest(stage.model)
+    assert [rounded_up(value) for value in (0.011, 0.2, 3.0, 5.1)] == [0.02, 0.2, 3.0, 10.0]
+
+
+def test_axes_alone_have_letters() -> None:
+    """Group 3 is often that of collision geoms in models of others."""
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><worldbody><body><freejoint/>
+          <geom size=".2" group="3"/><geom name="box" size=".2" pos="1 0 0" group="3"/>
+          <geom name="own_axis_y" type="capsule" size=".01" fromto="0 0 0 0 1 0" group="3"/>
+        </body></worldbody></mujoco>"""
+    )
+    assert body_axes(model) == {2: "y"}
+    assert longest(model) == pytest.approx(2.0)
+
+
+@needs_opengl
+def test_a_letter_is_where_the_arrow_ends(stage: Stage, row: Any) -> None:
+    """The tip that MuJoCo draws is where we compute the letter's place, but for its distance."""
+    attitude_now = row[4:8]
+    stage.set(0.0, row, attitude_now)
+    with Canvas(stage.model, (640, 360)) as canvas:
+        before = canvas.draw(stage.scene).astype(int)
+        up = 2.5 * stage.scene.camera[0].up.astype(float)
+        (letter,) = markers.add_arrow(stage.scene, row[1:4], up, 2.5, (1.0, 0.0, 1.0), "τ")
+        after = canvas.draw(stage.scene).astype(int)
+    y, x = np.nonzero(np.abs(after - before).max(axis=2) > 60)
+    place = markers.in_frame(stage.scene, letter.place)
+    assert place is not None
+    tip = y.argmin()
+    # 6 % of the arrow's length beyond it, 7 pixels here.
+    assert 360 * place[1] == pytest.approx(y[tip] - 7.0, abs=4.0)
+    assert 320 + 360 * place[0] == pytest.approx(x[tip], abs=3.0)
+
+
+def test_a_lander_has_a_trail_from_where_it_began_to_the_site(descent: Log) -> None:
+    model = from_mjb(gzip.decompress(descent.attachment("model.mjb.gz")))
+    times = np.array([0.1, 0.5])
+    drawn = list(decorations(descent, "lander:VariableStructure", model, times))
+    (first, _), (last, lines) = drawn
+    assert first is not None
+    assert last is not None
+    np.testing.assert_allclose(last.trail[0], [2000.0, 1500.0, 1003.8])
+    assert len(first.trail) < len(last.trail)
+    assert (np.diff(last.trail[:, 2]) < 0.0).all()
+    assert last.site == pytest.approx(descent.nearest("/reference", 0.5)["position"][:2])
+    assert [letter for _, letter, _ in lines] == ["v", "F"]
+    stage = Stage(model, "wide", None)
+    state = descent.nearest("/state", 0.5)["physics"]
+    stage.set(0.5, state, np.array([1.0, 0.0, 0.0, 0.0]), decorated=last)
+    with_all = stage.scene.ngeom
+    stage.set(0.5, state, np.array([1.0, 0.0, 0.0, 0.0]))
+    # Trail, two arrows, a ring of 36 pieces and a rod of 5.
+    assert with_all - stage.scene.ngeom == len(last.trail) + 2 + 36 + 5
+
+
+@needs_opengl
+def test_without_arrows_there_is_no_letter_either(pictured_log: Path, tmp_path: Path) -> None:
+    pictures = []
+    for arrows in (True, False):
+        path = tmp_path / f"{arrows}.png"
+        render(pictured_log, path, size=SIZE, at=0.5, arrows=arrows)
+        pictures.append(np.asarray(Image.open(path)).astype(int))
+    legend = pictures[0][: SIZE[1] // 6, : SIZE[0] // 2]
+    assert legend.max() > 195
+    assert (pictures[1][: SIZE[1] // 6, : SIZE[0] // 2].max(axis=2) > 195).sum() < 10  # stars
 
 
 def test_the_plume_on_stage_is_the_logged_thrust(descent: Log) -> None:

@@ -15,7 +15,7 @@ from mjspace.errors import InputError
 from mjspace.log.reader import Log
 from mjspace.plotting import phase_plane
 from mjspace.plotting.decimate import Line, outlines
-from mjspace.rendering.render import nearest_rows
+from mjspace.rendering.sampling import nearest_rows
 from mjspace.runner import report
 from mjspace.runner.replay import replay, verify
 from mjspace.runner.run import run
