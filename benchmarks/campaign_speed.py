@@ -2,7 +2,8 @@
 
 ``python benchmarks/campaign_speed.py [WORDS]``: the rows whose name has any of the words; all, when
 left out. A process flies them as each worker of ``mjspace campaign`` does, on one thread;
-bare is a loop of ``Batch.step`` over as many vehicles. Processor time, in turn: others on the same
+bare is a loop of ``Batch.step`` over as many vehicles, and untimed the same without MuJoCo's
+timers, which no flight has. Processor time, in turn: others on the same
 cores then count less. Times are of a step [us], core-hours of 1e6 members.
 """
 
@@ -102,10 +103,11 @@ def seconds(run: Callable[[], object]) -> float:
 
 
 def measured(case: Case) -> tuple[int, Array]:
-    """Return the steps of a member, and (rounds, 2 + parts) times of one [us]."""
+    """Return the steps of a member, and (rounds, 3 + parts) times of one [us]."""
     changes = (f"dispersions=[{case.dispersions}]",) if case.dispersions else ()
     everyone = population(campaign := Campaign(case.scenario, changes, case.members, seed=1))
-    bare = bare_batch(everyone.nominal, case.members, 1, BARE // case.members)
+    vehicles = everyone.nominal, case.members, 1, BARE // case.members
+    bare, untimed = bare_batch(*vehicles), bare_batch(*vehicles, timed=False)
     steps, rows = steps_of(everyone.nominal), []
     calls = [
         Call(campaign, everyone.identity, tuple(range(count)), "none", Path("unused"))
@@ -113,12 +115,12 @@ def measured(case: Case) -> tuple[int, Array]:
     ]
     fly_members(calls[0])  # compiles what no earlier flight has
     for _ in range(ROUNDS):
-        before = seconds(bare)
+        before = np.array([seconds(bare), seconds(untimed)])
         with parts_timed() as parts:
             whole = seconds(lambda: fly_members(calls[1]))
-        of_bare = (before + seconds(bare)) / (2 * BARE)
+        of_bare = (before + np.array([seconds(bare), seconds(untimed)])) / (2 * BARE)
         rows.append(
-            [of_bare, *(each / (steps * case.members) for each in (whole, *parts.values()))]
+            [*of_bare, *(each / (steps * case.members) for each in (whole, *parts.values()))]
         )
     return steps, 1e6 * np.array(rows)
 
@@ -126,14 +128,23 @@ def measured(case: Case) -> tuple[int, Array]:
 def main() -> None:
     """Print the table."""
     words = sys.argv[1:]
-    head("a campaign, one thread", "steps", "bare", "member", "ratio", *PARTS, "core-hours")
+    head(
+        "a campaign, one thread",
+        "steps",
+        "bare",
+        "untimed",
+        "member",
+        "ratio",
+        *PARTS,
+        "core-hours",
+    )
     for case in CASES:
         if words and not any(word in case.name for word in words):
             continue
         steps, times = measured(case)
-        bare, member, *parts = np.median(times, axis=0)
-        ratio = float(np.median(times[:, 1] / times[:, 0]))
-        cells = [f"{value:.2f}" for value in (bare, member, ratio, *parts)]
+        bare, untimed, member, *parts = np.median(times, axis=0)
+        ratio = float(np.median(times[:, 2] / times[:, 0]))
+        cells = [f"{value:.2f}" for value in (bare, untimed, member, ratio, *parts)]
         # Microseconds of a step, times steps, are seconds of a million members.
         row(case.name, str(steps), *cells, f"{member * steps / 3600.0:.0f}")
 

@@ -1,7 +1,11 @@
-"""Flights that are timed, and the bare steps of MuJoCo that they are compared with."""
+"""Flights that are timed, and the bare steps of MuJoCo that they are compared with.
+
+Bare is MuJoCo as its Python package comes, which times its own functions; a flight stops that.
+"""
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
@@ -12,6 +16,7 @@ from mjspace.scenario.loading import load
 from mjspace.simulation.assembly import Assembly, assemble
 from mjspace.simulation.initial_state import INTEGRATION, first_start
 from mjspace.simulation.loop import fly
+from mjspace.simulation.native_batch import stop_timers
 
 Run = Callable[[], object]
 
@@ -39,6 +44,18 @@ def logged(vehicle: Assembly) -> Run:
     return run
 
 
+@contextmanager
+def timers(*, on: bool = True) -> Iterator[None]:
+    """Let MuJoCo time its own functions, or not."""
+    mujoco.set_mjcb_time(None)  # the clock that the package installs
+    if not on:
+        stop_timers()
+    try:
+        yield
+    finally:
+        stop_timers()
+
+
 def bare_steps(vehicle: Assembly, steps: int) -> Run:
     """Return a loop of ``mj_step`` in Python, from where the vehicle starts."""
     model = vehicle.vehicle.model
@@ -46,21 +63,25 @@ def bare_steps(vehicle: Assembly, steps: int) -> Run:
 
     def run() -> None:
         mujoco.mj_setState(model, data, state, INTEGRATION)
-        for _ in range(steps):
-            mujoco.mj_step(model, data)
+        with timers():
+            for _ in range(steps):
+                mujoco.mj_step(model, data)
 
     return run
 
 
-def bare_batch(vehicle: Assembly, count: int, threads: int, steps: int) -> Run:
+def bare_batch(
+    vehicle: Assembly, count: int, threads: int, steps: int, *, timed: bool = True
+) -> Run:
     """Return a loop of ``Batch.step`` in Python, from where the vehicles start."""
     batch = Batch(vehicle.vehicle.model, count, threads)
     start = first_start(vehicle, range(count)).physics
 
     def run() -> None:
         batch.state[...] = start
-        for _ in range(steps):
-            batch.step()
+        with timers(on=timed):
+            for _ in range(steps):
+                batch.step()
 
     return run
 

@@ -38,10 +38,12 @@ class Windows:
         }
         self._happened = dict.fromkeys(self._events, math.nan)
         self._stamps = np.empty(0)
+        self._parts: dict[tuple[float, float], slice] = {}
 
     def add(self, time: Array, rows: Rows) -> None:
         """Go on with n > 0 control periods at ``time`` [s]."""
         self._stamps = np.rint(time * 1e9)  # as they stand in the log
+        self._parts.clear()
         for name, (event, signal) in self._events.items():
             if math.isnan(self._happened[name]):
                 inside = event.admits(magnitude(numbers_of(rows, signal)))
@@ -50,10 +52,13 @@ class Windows:
 
     def part(self, measured: Measurement) -> slice:
         """Return which of the periods that were last added are in the window."""
-        start, end = self._ends(measured)
-        low = np.searchsorted(self._stamps, np.rint(start * 1e9), "left")
-        high = np.searchsorted(self._stamps, np.rint(end * 1e9), "right")
-        return slice(int(low), max(int(low), int(high)))
+        ends = self._ends(measured)
+        if ends not in self._parts:  # many checks have the same
+            start, end = np.rint(np.array(ends) * 1e9)
+            low = int(self._stamps.searchsorted(start, "left"))
+            high = int(self._stamps.searchsorted(end, "right"))
+            self._parts[ends] = slice(low, max(low, high))
+        return self._parts[ends]
 
     def never(self, measured: Measurement) -> str:
         """Return which event that the window needs has not happened; "" if all have."""

@@ -51,6 +51,16 @@ def library() -> ctypes.CDLL:
     return loaded
 
 
+def stop_timers() -> None:
+    """Let MuJoCo no longer time its own functions, for ``mjData.timer``, in this process.
+
+    The Python package installs a clock, which is read some hundred times in a step with RK4: a
+    quarter of the step of a satellite. A clock of the user's own stays.
+    """
+    if mujoco.get_mjcb_time() is None:
+        ctypes.c_void_p.in_dll(library(), "mjcb_time").value = None
+
+
 def address(function: str) -> int:
     """Return where MuJoCo's C ``function`` is."""
     return ctypes.cast(getattr(library(), function), ctypes.c_void_p).value or 0
@@ -84,6 +94,7 @@ class NativeBatch:
         Raises:
             ValueError: MuJoCo cannot make it.
         """
+        stop_timers()
         message = ctypes.create_string_buffer(_ERROR_LENGTH)
         config = _Config(threads, False)
         self._batch = library().mjb_makeBatch(

@@ -170,3 +170,21 @@ def test_it_is_freed_when_nothing_of_it_is_held(
     gc.collect()
     assert gone() is None
     assert len(freed) == 1
+
+
+def test_mujocos_timers_stand_still_but_not_a_clock_of_the_users_own(pendulum: Any) -> None:
+    step = int(mujoco.mjtTimer.mjTIMER_STEP)
+    durations = []
+    for clock in (iter(range(1000)).__next__, None):  # None: the one that the package installs
+        mujoco.set_mjcb_time(clock)
+        try:
+            NativeBatch(pendulum, 1, 1, {})
+            data = mujoco.MjData(pendulum)
+            mujoco.mj_step(pendulum, data)
+        finally:
+            mujoco.set_mjcb_time(None)
+        durations.append(data.timer[step].duration)
+        assert data.timer[step].number == 1
+    native_batch.stop_timers()
+    assert durations[0] >= 1.0
+    assert durations[1] == 0.0
