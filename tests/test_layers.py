@@ -57,7 +57,7 @@ ROOMS = {
     ),
     "campaign": "contract errors interrupts log reporting runner scenario simulation units",
     "learning": "attitude contract errors scenario signals simulation",
-    "dm_env": "contract environment learning scenario simulation",
+    "dm_env": "contract environment errors learning scenario simulation",
     "gym": "campaign contract errors learning rendering scenario simulation",
     "terminal": "compiling errors log scenario",
     "conversion": "attitude contract errors log plotting rendering",
