@@ -17,7 +17,7 @@ from mjspace.campaign.requirement import objective, requirement
 from mjspace.campaign.search import minimize
 from mjspace.campaign.written import write_scenario
 from mjspace.contract import Array
-from mjspace.errors import FlightError, InputError, input_error_at
+from mjspace.errors import FlightError, InputError, input_error_at, nearest
 from mjspace.interrupts import Interrupted, on_signals
 from mjspace.runner import workers
 from mjspace.scenario.dispersions import path_of
@@ -79,6 +79,9 @@ class Goal:
         tables = [check.model_dump(exclude_defaults=True) for check in found]
         if self.is_one_of(metrics):
             return tables
+        if metrics and "(" not in self.minimized:
+            near = nearest(self.minimized, [metric.name for metric in metrics])
+            raise InputError(f"--minimize {self.minimized!r}: no metric of that name{near}")
         statistic, signal = objective(self.minimized, "--minimize")
         table = {"name": self.minimized, "signal": signal, "statistic": statistic, "below": _ANY}
         return [table, *tables]

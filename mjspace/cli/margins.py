@@ -28,8 +28,8 @@ def margins(
     only: Annotated[
         list[str],
         typer.Option(
-            help="delay, gain-up, gain-down, inertia-up, inertia-down, sampling, rate-noise or "
-            "attitude-noise; repeatable."
+            help="delay, lag, gain-up, gain-down, inertia-up, inertia-down, sampling, rate-noise "
+            "or attitude-noise; repeatable."
         ),
     ] = [],  # noqa: B006
     tolerance: Annotated[float, typer.Option(help="Of a margin, relative.")] = 0.05,

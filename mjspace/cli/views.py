@@ -1,5 +1,6 @@
 """The command ``mjspace view``: a log replayed or a scenario flown live, in a browser."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +12,12 @@ from mjspace.terminal.reporting import open_log, progress_bar
 
 if TYPE_CHECKING:
     from mjspace.log.reader import Log
+
+
+class Viewer(StrEnum):
+    """A viewer of others that opens a log."""
+
+    RERUN = "rerun"
 
 
 def view(
@@ -28,21 +35,29 @@ def view(
     native: Annotated[
         bool, typer.Option("--native", help="In MuJoCo's own viewer, where there is a display.")
     ] = False,
+    other: Annotated[
+        Viewer | None,
+        typer.Option("--with", help="Open a log in Rerun's viewer, in a window or a browser."),
+    ] = None,
     overrides: Set = [],  # noqa: B006
     trust: Trust = False,
 ) -> None:
     """Look at a flight in a browser: a log's, or a scenario's that is flown as you look."""
-    if native and export is not None:
-        raise InputError("--native, --export: give one of them")
-    _require_display() if native else _require_viser()
+    if sum((native, export is not None, other is not None)) > 1:
+        raise InputError("--native, --export, --with: give one of them")
+    _require(native, other)
     if not _is_log(what):
-        if export is not None:
-            raise InputError("--export: is for a log: fly the scenario first, 'mjspace run'")
+        if export is not None or other is not None:
+            option = "--export" if other is None else "--with"
+            raise InputError(f"{option}: is for a log: fly the scenario first, 'mjspace run'")
         _fly(what, overrides, None if native else (host, port), trust=trust)
         return
     if overrides or trust:
         raise InputError("--set, --trust: are for a scenario: a log is shown as it was flown")
     log = open_log(Path(what))
+    if other is not None:
+        _show_in_rerun(log)
+        return
     with input_error_at("view"):
         if export is not None:
             _export(log, export)
@@ -83,9 +98,17 @@ def _replay(log: "Log", served: tuple[str, int] | None) -> None:
 
     with serving(*served, "mjspace") as (server, address):
         replay = Replay(server, log)
-        print(f"{address}\nCtrl-C ends it.", flush=True)
         with on_signals() as stop:
+            print(f"{address}\nCtrl-C ends it.", flush=True)
             replay.run(stop)
+
+
+def _show_in_rerun(log: "Log") -> None:
+    from mjspace.conversion import rerun_viewer
+    from mjspace.interrupts import on_signals
+
+    with on_signals() as stop, progress_bar(log.end, "converting") as progress:
+        rerun_viewer.show(log, stop, progress)
 
 
 def _fly(
@@ -110,24 +133,27 @@ def _fly(
 
     with serving(*served, "mjspace") as (server, address):
         live = Live(server, lambda: LiveFlight(assembly))
-        print(f"{address}\nCtrl-C ends it.", flush=True)
         with on_signals() as stop:
+            print(f"{address}\nCtrl-C ends it.", flush=True)
             live.run(stop)
 
 
-def _require_display() -> None:
-    from mjspace.view.native import require_display
-
-    require_display()
-
-
-def _require_viser() -> None:
-    """Refuse to go on without the packages of the extra.
+def _require(native: bool, other: Viewer | None) -> None:
+    """Refuse to go on without what shows it: a display, or the packages of an extra.
 
     Raises:
-        InputError: viser is not installed.
+        InputError: it is missing.
     """
-    from importlib.util import find_spec
+    if native:
+        from mjspace.view.native import require_display
 
-    if find_spec("viser") is None:
-        raise missing("view", "viser", "view")
+        require_display()
+    elif other is Viewer.RERUN:
+        from mjspace.conversion.rerun_viewer import require_rerun
+
+        require_rerun()
+    else:
+        from importlib.util import find_spec
+
+        if find_spec("viser") is None:
+            raise missing("view", "viser", "view")

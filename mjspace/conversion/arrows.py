@@ -1,4 +1,4 @@
-"""Arrows for viewers: torque, thrust, momentum and disturbance, where and whither they act."""
+"""Arrows for viewers: of the bus's motion, and of thrust, where and whither it acts."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
@@ -9,6 +9,7 @@ import numpy as np
 from mjspace.attitude import conjugate, rotate
 from mjspace.contract import Array
 from mjspace.conversion.shown import Frames
+from mjspace.log.arrows import ARROWS
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering.flown_model import flown_model
@@ -17,23 +18,7 @@ _PERIOD = 0.05  # s between arrows, at least: 20 Hz
 _ENGINE = "engine_thrust"
 
 
-class Vectors(NamedTuple):
-    """A quantity of the bus that is drawn as an arrow."""
-
-    name: str
-    topic: str
-    field: str
-    in_body: bool
-    """Its numbers are in the bus's body axes, not in inertial ones."""
-    color: tuple[float, float, float]
-
-
-_AT_BUS = (
-    Vectors("torque", "/command", "torque", True, (0.88, 0.54, 0.12)),
-    Vectors("momentum", "/truth", "momentum", False, (0.12, 0.60, 0.66)),
-    Vectors("disturbance", "/disturbance", "torque", True, (0.76, 0.25, 0.56)),
-)
-_THRUST = (1.0, 0.45, 0.1)
+_THRUST = (255, 115, 25)
 
 
 class Arrows(NamedTuple):
@@ -43,7 +28,8 @@ class Arrows(NamedTuple):
     """
 
     name: str
-    color: tuple[float, float, float]
+    color: tuple[int, int, int]
+    """Red, green and blue, 0 to 255."""
     time: Array
     """s, shape (n,)."""
     origin: Array
@@ -57,7 +43,7 @@ def arrows_of(log: Log, frames: Mapping[str, Frames], bus: str, reach: float) ->
 
     The longest of each kind is as long as the vehicle's ``reach`` [m], the others in proportion;
     of thrust, twice that.
-    Torques and momentum begin at the bus; a thrust ends where it acts. What was zero throughout
+    What is of the bus begins there; a thrust ends where it acts. What was zero throughout
     has no arrow.
 
     Raises:
@@ -66,7 +52,7 @@ def arrows_of(log: Log, frames: Mapping[str, Frames], bus: str, reach: float) ->
     every = max(round(_PERIOD / log.control_period), 1)
     truth = log.read("/truth", ["attitude"], every=_stride(log, "/truth", every))
     found = []
-    for kind in _AT_BUS:
+    for kind in ARROWS:
         if log.topics.get(kind.topic, {}).get(kind.field) != (3,):
             continue
         rows = log.read(kind.topic, [kind.field], every=_stride(log, kind.topic, every))

@@ -174,9 +174,9 @@ def _add_shapes(
 
 def _add_arrows(rr: Any, recording: Any, place: str, found: list[Arrows], radius: float) -> None:
     for each in found:
-        path = f"{place}/{each.name}"
-        color = [round(255 * part) for part in each.color]
-        recording.log(path, rr.Arrows3D.from_fields(colors=[color], radii=[radius]), static=True)
+        path = f"{place}/{each.name.replace(' ', '_')}"
+        shown = rr.Arrows3D.from_fields(colors=[each.color], radii=[radius])
+        recording.log(path, shown, static=True)
         count = np.full(len(each.time), each.vector.shape[1])
         columns = rr.Arrows3D.columns(
             vectors=each.vector.reshape(-1, 3), origins=each.origin.reshape(-1, 3)

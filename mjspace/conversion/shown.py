@@ -5,13 +5,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-from google.protobuf.message import DecodeError
 
 from mjspace.contract import Array
-from mjspace.errors import InputError
-from mjspace.log.encoding import HEADER
+from mjspace.log.frames import parsed, poses_of
 from mjspace.log.reader import Log
 from mjspace.log.scene import REFERENCE
 
@@ -33,7 +30,8 @@ def shapes_of(log: Log) -> dict[str, Any]:
     Raises:
         InputError: the log is damaged.
     """
-    updates = [_parsed(log, "/scene", SceneUpdate, record) for record in log.records("/scene")]
+    records = log.records("/scene")
+    updates = [parsed(log.path, "/scene", SceneUpdate, record) for record in records]
     return {entity.frame_id: entity for update in updates for entity in update.entities}
 
 
@@ -45,8 +43,9 @@ def frames_of(log: Log) -> Mapping[str, Frames]:
     """
     rows: dict[str, list[tuple[float, ...]]] = {}
     for record in log.records("/tf"):
-        for each in _parsed(log, "/tf", FrameTransforms, record).transforms:
-            rows.setdefault(each.child_frame_id, []).append(_row(each))
+        found = poses_of(log.path, record)
+        for name, place, turn in zip(*found[1:], strict=True):
+            rows.setdefault(name, []).append((found.time, *place, *turn))
     numbers = {name: np.array(found) for name, found in rows.items()}
     return {name: Frames(n[:, 0], n[:, 1:4], n[:, 4:]) for name, n in numbers.items()}
 
@@ -59,11 +58,11 @@ def bus_of(log: Log) -> str:
     """
     truth = next(log.blocks("/truth", ["position", "attitude"]), None)
     for record in log.records("/tf"):
-        found = _parsed(log, "/tf", FrameTransforms, record).transforms
+        found = poses_of(log.path, record)
         places = {
-            each.child_frame_id: np.array(_row(each)[1:])
-            for each in found
-            if each.child_frame_id != REFERENCE
+            name: np.concatenate([place, turn])
+            for name, place, turn in zip(*found[1:], strict=True)
+            if name != REFERENCE
         }
         if truth is None:
             return str(next(iter(places), "world"))
@@ -88,19 +87,5 @@ def extent(shapes: Mapping[str, Any], frames: Mapping[str, Frames], bus: str) ->
     return max(reach) or 1.0
 
 
-def _row(each: Any) -> tuple[float, ...]:
-    """Return the time, position and quaternion of a ``foxglove.FrameTransform``."""
-    time = each.timestamp.seconds + each.timestamp.nanos * 1e-9
-    at, turn = each.translation, each.rotation
-    return time, at.x, at.y, at.z, turn.w, turn.x, turn.y, turn.z
-
-
 def _norm(vector: Any) -> float:
     return math.hypot(vector.x, vector.y, vector.z)
-
-
-def _parsed(log: Log, topic: str, kind: Any, record: bytes) -> Any:
-    try:
-        return kind.FromString(record[HEADER.itemsize :])
-    except DecodeError as error:
-        raise InputError(f"{log.path}: {topic} is not {kind.DESCRIPTOR.full_name}") from error

@@ -67,7 +67,7 @@ def _add(
     along: Array,
     length: float,
     thickness: float,
-    color: tuple[float, float, float],
+    color: tuple[int, int, int],
 ) -> None:
     head = min(4.0 * thickness, 0.5 * length)
     arrow.shaft_length, arrow.head_length = length - head, head
@@ -75,7 +75,7 @@ def _add(
     at, turn = arrow.pose.position, arrow.pose.orientation
     at.x, at.y, at.z = origin.tolist()
     turn.w, turn.x, turn.y, turn.z = _from_x(along).tolist()
-    arrow.color.r, arrow.color.g, arrow.color.b = color
+    arrow.color.r, arrow.color.g, arrow.color.b = (part / 255.0 for part in color)
     arrow.color.a = 1.0
 
 

@@ -31,6 +31,38 @@ class Poses(NamedTuple):
     """Body to world, scalar first, (bodies, 4)."""
 
 
+def poses_of(path: Path, record: bytes) -> Poses:
+    """Return what a Message record on /tf of the log at ``path`` tells.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    frames = parsed(path, "/tf", FrameTransforms, record).transforms
+    places = [(f.translation.x, f.translation.y, f.translation.z) for f in frames]
+    turns = [(f.rotation.w, f.rotation.x, f.rotation.y, f.rotation.z) for f in frames]
+    names = tuple(frame.child_frame_id for frame in frames)
+    return Poses(
+        _stamp(record) / 1e9, names, np.reshape(places, (-1, 3)), np.reshape(turns, (-1, 4))
+    )
+
+
+def parsed(path: Path, topic: str, kind: Any, record: bytes) -> Any:
+    """Return the message of a ``kind`` in a Message record on a topic of the log at ``path``.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    try:
+        return kind.FromString(record[HEADER.itemsize :])
+    except DecodeError as error:
+        raise InputError(f"{path}: {topic} is damaged: {error}") from error
+
+
+def _stamp(record: bytes) -> int:
+    """Return the time of a Message record [ns]."""
+    return int.from_bytes(record[_TIME : _TIME + 8], "little")
+
+
 class Frames:
     """The /scene and /tf of a log; of /tf the messages of at most three chunks are in memory.
 
@@ -64,7 +96,7 @@ class Frames:
         for place in self._chunks:
             if place.indexes is None or self._scene in place.indexes:
                 for record in self._read(place, self._scene, "/scene"):
-                    return self._parsed(SceneUpdate, record, "/scene")
+                    return parsed(self._path, "/scene", SceneUpdate, record)
         raise InputError(f"{self._path} holds nothing on /scene")
 
     def at(self, time: float) -> Poses:
@@ -82,20 +114,14 @@ class Frames:
             if not records:
                 raise InputError(f"{self._path} holds nothing on /tf near {time:g} s")
             self._near, self._records = near, records
-            self._stamps = [int.from_bytes(r[_TIME : _TIME + 8], "little") for r in records]
+            self._stamps = [_stamp(record) for record in records]
         best = min(range(len(self._stamps)), key=lambda i: abs(self._stamps[i] - stamp))
-        message = self._parsed(FrameTransforms, self._records[best], "/tf")
-        return self._poses(self._stamps[best] / 1e9, message)
-
-    def _poses(self, time: float, message: Any) -> Poses:
-        frames = message.transforms
-        places = [(f.translation.x, f.translation.y, f.translation.z) for f in frames]
-        turns = [(f.rotation.w, f.rotation.x, f.rotation.y, f.rotation.z) for f in frames]
-        position, quaternion = np.reshape(places, (-1, 3)), np.reshape(turns, (-1, 4))
-        if not (np.isfinite(position).all() and np.isfinite(quaternion).all()):
-            raise InputError(f"{self._path}: /tf has a number that is not finite at t = {time:g} s")
-        names = tuple(frame.child_frame_id for frame in frames)
-        return Poses(time, names, position, quaternion)
+        found = poses_of(self._path, self._records[best])
+        if not (np.isfinite(found.position).all() and np.isfinite(found.quaternion).all()):
+            raise InputError(
+                f"{self._path}: /tf has a number that is not finite at t = {found.time:g} s"
+            )
+        return found
 
     def _read(self, place: ChunkPlace, channel: int, topic: str) -> Iterator[bytes]:
         """Yield the channel's Message records in a chunk."""
@@ -106,9 +132,3 @@ class Frames:
                 yield from content.records(channel)
         except ValueError as error:
             raise InputError(f"{self._path}: {topic} cannot be read: {error}") from error
-
-    def _parsed(self, kind: Any, record: bytes, topic: str) -> Any:
-        try:
-            return kind.FromString(record[HEADER.itemsize :])
-        except DecodeError as error:
-            raise InputError(f"{self._path}: {topic} is damaged: {error}") from error

@@ -1,6 +1,7 @@
-"""Checks that the OpenGL library named by the environment variable MUJOCO_GL is installed.
+"""What this machine can draw with: a display, and the OpenGL library that MUJOCO_GL names.
 
-MuJoCo reads the variable when it is imported, and fails with a traceback for any command.
+MuJoCo reads that environment variable when it is imported, and fails with a traceback for any
+command where the library is not installed.
 """
 
 import os
@@ -48,3 +49,9 @@ def check() -> None:
 def is_off() -> bool:
     """Tell whether MUJOCO_GL switches rendering off."""
     return chosen() in _OFF
+
+
+def has_display() -> bool:
+    """Return whether a window can be opened: on Linux, whether a display is named."""
+    named = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return sys.platform != "linux" or bool(named)

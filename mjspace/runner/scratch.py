@@ -25,12 +25,15 @@ def folder() -> Iterator[Path]:
     place = Path(tempfile.gettempdir())
     for left in place.glob(f"{PREFIX}????????"):
         _remove_unlocked(left)
-    while True:
+    while True:  # until no other process takes it for one that was left, before it is locked
         made = Path(tempfile.mkdtemp(prefix=PREFIX, dir=place))
-        descriptor = os.open(made, os.O_RDONLY)
+        try:
+            descriptor = os.open(made, os.O_RDONLY)
+        except FileNotFoundError:
+            continue
         if lock.lock(descriptor) and made.exists():
             break
-        os.close(descriptor)  # another process took it for one that was left
+        os.close(descriptor)
     try:
         yield made
     finally:

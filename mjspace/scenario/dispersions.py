@@ -117,7 +117,9 @@ class Dispersion(Table):
         return [each for each in (*given, *(self.values or ())) if isinstance(each, Quantity)]
 
     def _fits_together(self) -> None:
-        if self.keys is None or self.covariance is None or self.distribution != "normal":
+        if self.covariance is None:
+            raise ValueError("covariance: missing, keys need it")
+        if self.keys is None or self.distribution != "normal":
             raise ValueError('covariance: goes with keys and distribution = "normal"')
         for name in _PARAMETERS:
             if getattr(self, name) is not None:

@@ -45,7 +45,7 @@ class Metric(Measurement):
     def _a_region(self) -> Self:
         bounds = [each for each in (self.below, self.above) if each is not None]
         if bool(bounds) != (self.statistic == "time_inside"):
-            raise ValueError("below and above go with statistic time_inside, which needs one")
+            raise ValueError("statistic: 'time_inside' needs below or above, and no other has them")
         if self.below is not None and self.above is not None and self.below <= self.above:
             raise ValueError(
                 f"below {self.below:g} and above {self.above:g}: nothing is inside, "

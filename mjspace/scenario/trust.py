@@ -149,8 +149,9 @@ class Trust:
             if own_file or _belongs_to(value, module)
         }
         if name not in names:
-            classes = [key for key, value in names.items() if inspect.isclass(value)]
-            raise ValueError(f"{place!r} has no {name!r}{nearest(name, classes)}")
+            own = [key for key, each in names.items() if callable(each) and key[:1] != "_"]
+            classes = [key for key in own if inspect.isclass(names[key])]
+            raise ValueError(f"{place!r} has no {name!r}{nearest(name, classes or own)}")
         found = names[name]
         if not callable(found):
             raise ValueError(f"{kind} is neither a class nor a function: {type(found).__name__}")

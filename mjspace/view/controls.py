@@ -1,10 +1,17 @@
-"""The controls that every view has: what is drawn, and what the camera follows."""
+"""What every view has: its loop, the controls of what is drawn, and what the camera follows."""
 
+import time as clock
+from collections.abc import Callable
 from threading import Event
 from typing import Any
 
-from mjspace.view.scene import ARROWS, FOLLOWS, Scene
+from mjspace.log.arrows import ARROWS
+from mjspace.view.scene import FOLLOWS, Scene
 
+FRAME = 1.0 / 25.0
+"""Wall time between two drawings of the scene [s]."""
+PLOTS = 0.2
+"""Wall time between two drawings of the plots [s]."""
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "5", "10", "50", "200", "1000")
 """Simulated seconds for each second."""
 
@@ -27,6 +34,21 @@ def add_display(gui: Any, scene: Scene, changed: Event) -> None:
         def _(_: Any, what: str = what, box: Any = box) -> None:
             scene.shown[what] = box.value
             changed.set()
+
+
+def keep_showing(
+    advance: Callable[[float], None], changed: Event, stop: Callable[[], bool]
+) -> None:
+    """Call ``advance`` with the wall time since the last call [s] until ``stop`` returns True.
+
+    It is called every ``FRAME``, and at once where ``changed`` is set.
+    """
+    before = clock.monotonic()
+    while not stop():
+        now = clock.monotonic()
+        advance(now - before)
+        before = now
+        changed.wait(max(0.0, FRAME - (clock.monotonic() - now)))
 
 
 def _legend() -> list[str]:

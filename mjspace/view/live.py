@@ -14,15 +14,13 @@ from mjspace.contract import Array
 from mjspace.errors import printable
 from mjspace.log.scene import scene as geometry
 from mjspace.simulation.live_flight import BROKEN, LiveFlight
-from mjspace.view.controls import SPEEDS, add_display
+from mjspace.view.controls import FRAME, PLOTS, SPEEDS, add_display, keep_showing
 from mjspace.view.history import History
 from mjspace.view.scene import Moment, Scene
 from mjspace.view.server import Server
 from mjspace.view.shapes import bodies, scene_update
 
-_FRAME = 1.0 / 25.0  # s of wall time
 _FLYING = 0.7  # of that: the rest is for drawing
-_PLOTS = 0.2  # s of wall time between two drawings of the plots
 _EVENTS = 8
 _KICK = 0.05  # rad/s, what the push that is proposed gives in a second
 
@@ -60,12 +58,7 @@ class Live:
         Raises:
             FlightError: the law raised, or the motion is no longer finite.
         """
-        before = clock.monotonic()
-        while not stop():
-            now = clock.monotonic()
-            self.advance(now - before)
-            before = now
-            self._changed.wait(max(0.0, _FRAME - (clock.monotonic() - now)))
+        keep_showing(self.advance, self._changed, stop)
 
     def advance(self, seconds: float) -> None:
         """Do what was asked for, fly for so many ``seconds`` of wall time, and draw.
@@ -93,7 +86,7 @@ class Live:
     def _fly(self, seconds: float) -> None:
         control = self.flight.assembly.scenario.rates.control
         self._debt += seconds
-        due = clock.monotonic() + _FLYING * _FRAME
+        due = clock.monotonic() + _FLYING * FRAME
         while self._debt >= control and not self.flight.over and clock.monotonic() < due:
             self.flight.fly(1)
             self._debt -= control
@@ -111,7 +104,7 @@ class Live:
         moment = Moment(flight.period.time, flight.poses(), flight.desired.attitude, vectors)
         self.scene.show(moment)
         now = clock.monotonic()
-        if not self.playing or now > self._plotted + _PLOTS:
+        if not self.playing or now > self._plotted + PLOTS:
             self._plotted = now
             self._history.note(flight)
             self._history.draw()

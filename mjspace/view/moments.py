@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.log.arrows import ARROWS
 from mjspace.log.frames import Frames
 from mjspace.log.reader import Log
-from mjspace.view.scene import ARROWS, Moment, trail
+from mjspace.view.scene import Moment, trail
 
 _AHEAD = 1.0  # s that is read at once
 _TRAIL_POINTS = 1000

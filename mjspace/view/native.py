@@ -1,7 +1,5 @@
 """MuJoCo's own viewer, where there is a display: a log replayed, or a scenario flown live."""
 
-import os
-import sys
 import time as clock
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -13,6 +11,7 @@ from mjspace.errors import InputError
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
 from mjspace.rendering.flown_model import flown_model
+from mjspace.rendering.graphics import has_display
 from mjspace.simulation.live_flight import LiveFlight
 
 _FRAME = 1.0 / 50.0  # s of wall time
@@ -24,8 +23,7 @@ def require_display() -> None:
     Raises:
         InputError: there is no display.
     """
-    shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if sys.platform == "linux" and not shown:
+    if not has_display():
         raise InputError("--native: there is no display: leave it out to look in a browser")
 
 

@@ -9,14 +9,11 @@ from mjspace.errors import InputError
 from mjspace.log.reader import Log
 from mjspace.plotting.panels import Curves, curves
 from mjspace.view import plots
-from mjspace.view.controls import SPEEDS, add_display
+from mjspace.view.controls import PLOTS, SPEEDS, add_display, keep_showing
 from mjspace.view.moments import Moments, Survey
 from mjspace.view.scene import Scene
 from mjspace.view.server import Server
 from mjspace.view.shapes import bodies
-
-_FRAME = 1.0 / 25.0  # s of wall time
-_PLOTS = 0.2  # s of wall time between two cursors of the plots
 
 
 class Replay:
@@ -55,12 +52,7 @@ class Replay:
             InputError: the log is damaged further on.
         """
         Thread(target=self._survey, name="survey", daemon=True).start()
-        before = clock.monotonic()
-        while not stop():
-            now = clock.monotonic()
-            self.advance(now - before)
-            before = now
-            self._changed.wait(max(0.0, _FRAME - (clock.monotonic() - now)))
+        keep_showing(self.advance, self._changed, stop)
 
     def advance(self, seconds: float) -> None:
         """Draw what is shown so many ``seconds`` of wall time later.
@@ -84,7 +76,7 @@ class Replay:
         self._slider.value = self.time
         self.scene.show(self._moments.at(self.time))
         now = clock.monotonic()
-        if not self.playing or now > self._plotted + _PLOTS:
+        if not self.playing or now > self._plotted + PLOTS:
             self._plotted = now
             for plot in self._plots:
                 plot.show(self.time)

@@ -7,6 +7,7 @@ import numpy as np
 
 from mjspace import attitude
 from mjspace.contract import Array
+from mjspace.log.arrows import ARROWS, Arrow
 from mjspace.log.frames import Poses
 from mjspace.view.shapes import Body
 
@@ -15,26 +16,6 @@ FOLLOWS = ("the spacecraft", "the spacecraft, turning with it", "nothing")
 _AXES = ((242, 64, 51), (77, 217, 77), (77, 128, 255))  # x, y, z
 _TRAIL = (255, 200, 60)
 _STILL = 0.5  # of the vehicle's radius: what moves less leaves the trail of its x axis
-
-
-class Arrow(NamedTuple):
-    """A vector that is drawn at the spacecraft."""
-
-    name: str
-    topic: str
-    field: str
-    """Of three numbers."""
-    color: tuple[int, int, int]
-    in_body: bool
-    """Whether it is in body axes; else in inertial ones."""
-
-
-ARROWS = (
-    Arrow("angular velocity", "/truth", "rate", (255, 140, 0), True),
-    Arrow("commanded torque", "/command", "torque", (220, 60, 220), True),
-    Arrow("disturbance torque", "/disturbance", "torque", (0, 200, 200), True),
-    Arrow("total momentum", "/truth", "momentum", (150, 150, 150), False),
-)
 
 
 class Moment(NamedTuple):

@@ -112,7 +112,7 @@ def test_a_covariance_may_be_singular() -> None:
         ([[1, 0.5, 0], [0.4, 1, 0], [0, 0, 1]], {}, r"\[0\]\[1\] is 0.5, \[1\]\[0\] is 0.4"),
         ([[1, 2, 0], [2, 1, 0], [0, 0, 1]], {}, "not positive semidefinite: .* is -1"),
         ([[1, 0, 0], [0, -1, 0], [0, 0, 1]], {}, "not positive semidefinite"),
-        (None, {}, 'covariance: goes with keys and distribution = "normal"'),
+        (None, {}, "covariance: missing, keys need it"),
         (np.eye(3).tolist(), {"keys": None}, "key: give one, or keys"),
         (np.eye(3).tolist(), {"key": "law.rate_gain"}, "key: give one, or keys"),
         (np.eye(3).tolist(), {"distribution": "uniform"}, 'distribution = "normal"'),

@@ -67,7 +67,7 @@ def test_a_copy_has_all_of_the_log(log: Log, copy: Log) -> None:
 
 
 def test_arrows_are_along_what_acts_and_in_proportion(log: Log, copy: Log) -> None:
-    found = arrows(copy, "torque")
+    found = arrows(copy, "commanded torque")
     reach = extent(shapes_of(log), frames_of(log), "bus")
     lengths = np.array([length for _, _, length in found])
     assert lengths.max() == pytest.approx(reach)
@@ -77,7 +77,7 @@ def test_arrows_are_along_what_acts_and_in_proportion(log: Log, copy: Log) -> No
         wanted.append(np.linalg.norm(torque))
         np.testing.assert_allclose(along, torque / wanted[-1], atol=1e-9)
     np.testing.assert_allclose(lengths / reach, np.array(wanted) / max(wanted), rtol=1e-9)
-    for time, along, length in arrows(copy, "momentum"):
+    for time, along, length in arrows(copy, "total momentum"):
         truth = log.nearest("/truth", time)
         turned = rotate(truth["attitude"], length * along)  # inertial: it does not change
         np.testing.assert_allclose(turned / reach, truth["momentum"] / norm, atol=1e-6)

@@ -128,8 +128,8 @@ def test_a_window_that_never_comes_leaves_nothing_to_measure() -> None:
         ({"function": "x.py:f"}, "signals: missing"),
         ({"signal": "truth.error", "signals": ["truth.error"]}, "go with a function"),
         ({"function": "x.py:f", "signals": ["a.b"], "statistic": "rms"}, "go with a signal"),
-        ({"signal": "truth.error", "below": 1.0}, "go with statistic time_inside"),
-        ({"signal": "truth.error", "statistic": "time_inside"}, "which needs one"),
+        ({"signal": "truth.error", "below": 1.0}, "'time_inside' needs below or above"),
+        ({"signal": "truth.error", "statistic": "time_inside"}, "needs below or above"),
         (
             {"signal": "truth.error", "statistic": "time_inside", "below": 1, "above": 2},
             "nothing is inside",
@@ -201,7 +201,7 @@ def test_a_flight_its_log_and_its_replay_have_the_same_metrics(
     [
         ("def settled(time): ...", r"settled\(time\): should take \(time, signals\)"),
         ("class settled: ...", "is a type, should be a function"),
-        ("def other(time, signals): ...", "has no 'settled'"),
+        ("def other(time, signals): ...", "has no 'settled': have other"),
         ("import nothing_of_the_kind", "cannot be imported"),
     ],
 )

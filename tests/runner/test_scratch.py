@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -78,3 +79,20 @@ def test_one_that_was_taken_for_left_is_made_again(monkeypatch: pytest.MonkeyPat
     with scratch.folder() as made:
         assert made.exists()
     assert len(taken) == 2
+
+
+def test_one_that_is_removed_before_it_is_opened_is_made_again(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made_by, removed = tempfile.mkdtemp, list[str]()
+
+    def lost(**options: Any) -> str:
+        made = made_by(**options)
+        if not removed:  # another process cleans up at that moment
+            removed.append(made)
+            Path(made).rmdir()
+        return made
+
+    monkeypatch.setattr(tempfile, "mkdtemp", lost)
+    with scratch.folder() as made:
+        assert list(place.iterdir()) == [made] != [Path(removed[0])]
