@@ -1,4 +1,4 @@
-"""The command ``mjspace view``: a log replayed or a scenario flown live, in a browser."""
+"""The command ``mjspace view``: a log replayed or a scenario flown live, or opened elsewhere."""
 
 from enum import StrEnum
 from pathlib import Path
