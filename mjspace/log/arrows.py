@@ -1,4 +1,4 @@
-"""What of a log viewers draw as arrows at the bus, and in which colors."""
+"""What of a log viewers draw as arrows at the bus, and in which colors; pictures have the same."""
 
 from typing import NamedTuple
 
@@ -17,8 +17,14 @@ class Arrow(NamedTuple):
 
 
 ARROWS = (
-    Arrow("angular velocity", "/truth", "rate", (255, 140, 0), True),
-    Arrow("commanded torque", "/command", "torque", (220, 60, 220), True),
-    Arrow("disturbance torque", "/disturbance", "torque", (0, 200, 200), True),
-    Arrow("total momentum", "/truth", "momentum", (150, 150, 150), False),
+    Arrow("angular velocity", "/truth", "rate", (179, 128, 255), True),
+    Arrow("commanded torque", "/command", "torque", (242, 140, 26), True),
+    Arrow("disturbance torque", "/disturbance", "torque", (220, 60, 220), True),
+    Arrow("total momentum", "/truth", "momentum", (31, 179, 194), False),
 )
+
+
+def color_of(name: str) -> tuple[float, float, float]:
+    """Return red, green and blue of the arrow of that name, 0 to 1."""
+    (red, green, blue) = next(arrow.color for arrow in ARROWS if arrow.name == name)
+    return red / 255.0, green / 255.0, blue / 255.0

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
+from mjspace.log.arrows import color_of
 from mjspace.log.reader import Log
 from mjspace.rendering.captions import TURNING, flies_a_path
 from mjspace.rendering.plume import PLUME
@@ -48,11 +49,13 @@ class Kind(NamedTuple):
 _TORQUE = (("/command", "torque"), ("/law", "torque"))
 _MOMENTUM, _RATE = (("/truth", "momentum"),), (("/truth", "rate"),)
 _VELOCITY, _THRUST = (("/truth", "velocity"),), (("/truth", "thrust"),)
-TORQUE = Kind("torque", "τ", _TORQUE, "body", "N m", (0.95, 0.55, 0.1), 1e-9)
-MOMENTUM = Kind("momentum", "H", _MOMENTUM, "world", "N m s", (0.12, 0.7, 0.76), 1e-9)
+TORQUE = Kind("torque", "τ", _TORQUE, "body", "N m", color_of("commanded torque"), 1e-9)
+MOMENTUM = Kind("momentum", "H", _MOMENTUM, "world", "N m s", color_of("total momentum"), 1e-9)
 # Shorter, so that it does not end where the momentum does when it is along that.
 RATE = Kind(
-    "rate", "ω", _RATE, "body", "deg/s", (0.7, 0.5, 1.0), 1e-6, float(np.degrees(1.0)), share=0.7
+    *("rate", "ω", _RATE, "body", "deg/s", color_of("angular velocity"), 1e-6),
+    shown=float(np.degrees(1.0)),
+    share=0.7,
 )
 VELOCITY = Kind("velocity", "v", _VELOCITY, "world", "m/s", YELLOW, 1e-4)
 THRUST = Kind("thrust", "F", _THRUST, "engine", "N", (1.0, 0.45, 0.1), 1e-3)
