@@ -16,7 +16,7 @@ ABOVE = "    python: KindName | None"
 """The line above which the recipe has its own written."""
 
 
-@pytest.mark.slow  # the callback is compiled afresh
+@pytest.mark.long  # the callback is compiled afresh
 def test_a_native_disturbance_is_one_file_and_one_line(tmp_path: Path) -> None:
     page = (ROOT / "docs/extending.md").read_text()
     section = page.partition("## A native disturbance\n")[2].partition("\n## ")[0]

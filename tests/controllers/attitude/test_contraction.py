@@ -163,7 +163,7 @@ def test_learning_all_nine_parameters_takes_a_motion_about_all_axes() -> None:
     assert estimate_error(of) == pytest.approx(4.9e-4, abs=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_sampled_estimates_tend_to_the_continuous_ones() -> None:
     flights = [
         flight(Adaptive(h, adaptation_gain=5.0), MultiAxis(), 10.0, h) for h in (1e-3, 0.5e-3)
@@ -309,7 +309,7 @@ def test_adaptive_parameter_errors_after_20_s(
     assert of.distance[-1] == pytest.approx(distance, rel=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_adaptive_multi_axis_for_40_s() -> None:
     of = flight(Adaptive(PERIOD), MultiAxis(), 40.0)
     assert of.distance.max() == pytest.approx(1.34e-2, abs=1e-4)

@@ -44,7 +44,7 @@ def test_the_half_turn_is_as_fast_as_in_the_paper() -> None:
     assert np.abs(rate).max() < 1e-8
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_asymmetric_body_arrives_within_its_limits() -> None:
     target = att.from_rotation_vector(np.radians(120.0) * att.normalize(np.array([1.0, -2.0, 1.5])))
     slew = minimum_time_slew(INERTIA, LIMIT, target)
