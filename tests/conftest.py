@@ -1,6 +1,7 @@
 """Its presence puts this folder on the path: ``from oracle import fly`` works in every test."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -15,6 +16,10 @@ from mjspace.simulation import loop
 # failure could not be told from a change.
 settings.register_profile("mjspace", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("mjspace")
+
+# A shell that starts the tests in the background has them ignore Ctrl-C, and all that they start.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
