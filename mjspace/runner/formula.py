@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from mjspace.contract import Array
 from mjspace.errors import missing, nearest
@@ -140,6 +139,8 @@ def _children(node: Any) -> list[Any]:
 
 def _ahead(values: Array, low: int, high: int, largest: bool) -> Array:
     """Return the largest or least of the samples from ``low`` to ``high`` ahead (behind if < 0)."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d  # 30 ms of each start
+
     size = high - low + 1
     empty = -np.inf if largest else np.inf
     keep = max(abs(low), abs(high))
