@@ -9,8 +9,9 @@ from typing import Any
 
 from markupsafe import Markup
 
-from mjspace.errors import printable
-from mjspace.log import frame, reader
+from mjspace.errors import missing, printable
+from mjspace.log import reader
+from mjspace.log.columns import select
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.runner.checks import Verdict
 from mjspace.runner.logged_verdicts import judged
@@ -56,7 +57,24 @@ class Log(reader.Log):
             InputError: the log has no such topic or field, a chunk is damaged, or pandas is
                 missing.
         """
-        return frame.frame(self, topic, fields, start, end, every)
+        try:
+            import pandas
+        except ImportError:
+            raise missing("a table", "pandas", "data") from None
+        topic = topic if topic.startswith("/") else f"/{topic}"
+        rows = self.read(topic, fields, start, end, every)
+        prefix = f"{topic.removeprefix('/')}."
+        columns: dict[str, Any] = {}
+        units: dict[str, str] = {}
+        signals = {signal.field: signal for signal in select(self, topics=[topic])}
+        for signal in (signals[name] for name in rows if name in signals):
+            names = [column.removeprefix(prefix) for column in signal.columns]
+            columns |= dict(zip(names, signal.of(rows[signal.field]).T, strict=True))
+            if unit := self.units[topic].get(signal.field):
+                units |= dict.fromkeys(names, unit)
+        found = pandas.DataFrame(columns, index=pandas.Index(rows["time"], name="time [s]"))
+        found.attrs["units"] = units
+        return found
 
     def plot(self, *signals: str) -> Shown:
         """Return the page of plots: the standard one, or one panel for each of ``signals``.
