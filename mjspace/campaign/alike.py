@@ -4,10 +4,15 @@ They share law, sensors and actuators, and differ in where they start and in mas
 """
 
 import pickle
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from mjspace.campaign.members import Population
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.effects import effects_of
+from mjspace.simulation.initial_state import Start, initial_physics, start_at
 from mjspace.simulation.state_layout import StateLayout
 
 _STARTS = ("attitude", "euler", "rate", "position", "velocity", "wheel_speed", "momentum")
@@ -42,6 +47,15 @@ def alike(one: Assembly, other: Assembly) -> bool:
     if one.scenario != other.scenario.model_copy(update=moved):
         return False
     return pickle.dumps(one.actuators) == pickle.dumps(other.actuators)
+
+
+def start_of(assemblies: Sequence[Assembly], members: Sequence[int]) -> Start:
+    """Return where members that are ``alike`` start, of these numbers, in rows of one batch."""
+    physics = np.concatenate([initial_physics(each, 1) for each in assemblies])
+    start = start_at(first := assemblies[0], physics, members)
+    if all(each.vehicle is first.vehicle for each in assemblies):
+        return start
+    return replace(start, models=[each.vehicle.model for each in assemblies])
 
 
 def _has_effects(assembly: Assembly) -> bool:

@@ -4,17 +4,14 @@ import json
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from mjspace.campaign.alike import alike
+from mjspace.campaign.alike import alike, start_of
 from mjspace.campaign.members import Campaign, Population, population
 from mjspace.campaign.places import is_remote, write_whole
-from mjspace.contract import Array
 from mjspace.errors import FlightError, InputError
 from mjspace.interrupts import Interrupted
 from mjspace.runner import scratch
@@ -23,7 +20,7 @@ from mjspace.runner.metrics import Measured
 from mjspace.runner.output import LOG
 from mjspace.runner.run import fly_to_log, refuse_unjudgeable
 from mjspace.simulation.assembly import Assembly
-from mjspace.simulation.initial_state import Start, first_start, initial_physics, start_at
+from mjspace.simulation.initial_state import Start, first_start
 from mjspace.simulation.loop import fly
 from mjspace.simulation.recording import one_vehicle, shapes
 
@@ -64,8 +61,6 @@ class _Member:
 
     number: int
     assembly: Assembly
-    physics: Array
-    """Where it starts, (1, nstate)."""
     draws: list[Any]
     seconds: float
     """Of wall time, to assemble it."""
@@ -74,8 +69,7 @@ class _Member:
     def of(cls, members: Population, number: int) -> "_Member":
         began = time.perf_counter()
         assembly, draws = members.member(number)
-        physics = initial_physics(assembly, 1)
-        return cls(number, assembly, physics, draws, time.perf_counter() - began)
+        return cls(number, assembly, draws, time.perf_counter() - began)
 
 
 def log_of(out: Path, member: int) -> Path:
@@ -145,10 +139,7 @@ def _side_by_side(group: Sequence[_Member]) -> list[Flown]:
     """Fly members that are ``alike``; where one has to end early, again in two halves."""
     began = time.perf_counter()
     first, numbers = group[0].assembly, [each.number for each in group]
-    start = start_at(first, np.concatenate([each.physics for each in group]), numbers)
-    if any(each.assembly.vehicle is not first.vehicle for each in group):
-        models = [each.assembly.vehicle.model for each in group]
-        start = replace(start, models=models)
+    start = start_of([each.assembly for each in group], numbers)
     judges, trouble = judged(first, start, numbers)
     if trouble and len(group) > 1:
         half = len(group) // 2

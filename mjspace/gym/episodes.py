@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjspace.campaign.alike import alike
+from mjspace.campaign.alike import alike, start_of
 from mjspace.campaign.members import Campaign, populated
 from mjspace.contract import Array, Event
 from mjspace.learning.action import Action
@@ -21,7 +20,7 @@ from mjspace.learning.task import Task
 from mjspace.scenario.loading import read, validated
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
-from mjspace.simulation.initial_state import Start, initial_physics, last_period, start_at
+from mjspace.simulation.initial_state import Start, last_period
 from mjspace.simulation.stepper import Stepper
 
 MEMBERS = 2**31
@@ -88,12 +87,8 @@ class Episodes:
 
     def _side_by_side(self, group: Sequence[tuple[int, Assembly]]) -> "Flight":
         numbers, assemblies = [number for number, _ in group], [each for _, each in group]
-        first = assemblies[0]
-        physics = np.concatenate([initial_physics(each, 1) for each in assemblies])
-        start = start_at(first, physics, numbers)
-        if any(each.vehicle is not first.vehicle for each in assemblies):
-            start = replace(start, models=[each.vehicle.model for each in assemblies])
-        return Flight(self, first, start, numbers, self._threads)
+        start = start_of(assemblies, numbers)
+        return Flight(self, assemblies[0], start, numbers, self._threads)
 
 
 class Step(NamedTuple):
