@@ -19,7 +19,6 @@ from mjspace.contract import Array, Event, Measurement
 from mjspace.dm_env import bridge
 from mjspace.environment.install import install_callbacks
 from mjspace.learning.action import Action
-from mjspace.learning.desired import Desired
 from mjspace.learning.no_law import refuse_what_needs_a_law
 from mjspace.learning.signals import Signals
 from mjspace.learning.task import Task
@@ -27,6 +26,7 @@ from mjspace.scenario import loading
 from mjspace.scenario.scenario import Scenario
 from mjspace.simulation.assembly import Assembly, without_law
 from mjspace.simulation.control_period import ControlPeriod
+from mjspace.simulation.desired import Desired
 from mjspace.simulation.initial_state import INTEGRATION, initial_physics, last_period, start_at
 from mjspace.simulation.stepper import Stepper
 

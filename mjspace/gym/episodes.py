@@ -13,13 +13,13 @@ from mjspace.campaign.alike import alike, start_of
 from mjspace.campaign.members import Campaign, populated
 from mjspace.contract import Array, Event
 from mjspace.learning.action import Action
-from mjspace.learning.desired import Desired
 from mjspace.learning.no_law import refuse_what_needs_a_law
 from mjspace.learning.signals import Signals, rows
 from mjspace.learning.task import Task
 from mjspace.scenario.loading import read, validated
 from mjspace.simulation.assembly import Assembly
 from mjspace.simulation.control_period import ControlPeriod
+from mjspace.simulation.desired import Desired
 from mjspace.simulation.initial_state import Start, last_period
 from mjspace.simulation.stepper import Stepper
 

@@ -9,23 +9,22 @@ import numpy as np
 from mujoco.batch import SimulationError
 
 from mjspace.actuators.faults import Fault
-from mjspace.contract import Array, DesiredMotion, Event
+from mjspace.contract import Array, Event
 from mjspace.errors import FlightError
 from mjspace.log.frames import Poses
 from mjspace.sensors.fault_kinds import IN_FORCE, PHASE
 from mjspace.simulation.assembly import Assembly, facts_of
 from mjspace.simulation.compiled_blocks import stopped_at
 from mjspace.simulation.control_period import ControlPeriod
+from mjspace.simulation.desired import Desired
 from mjspace.simulation.flown_law import FlownLaw
 from mjspace.simulation.initial_state import INTEGRATION, first_start, last_period
 from mjspace.simulation.live_gains import gains_of, with_gain
 from mjspace.simulation.stepper import Stepper
-from mjspace.simulation.user_code import reference_at
 from mjspace.vehicle.step_effect import Instant, State, StepEffect
 
 BROKEN = ("dead", "stuck")
 """How a motor may be broken: kinds of fault without a value."""
-_AHEAD = 500  # periods of which the reference is asked for at once
 _NEVER = 1e9  # s, when the faults that wait for a person begin by themselves
 
 
@@ -88,7 +87,7 @@ class LiveFlight:
         self._last = last_period(assembly.scenario)
         self._model = assembly.vehicle.model
         self._data = mujoco.MjData(self._model)
-        self._references: tuple[int, DesiredMotion] | None = None
+        self._reference = Desired(assembly)
         self.events: list[Event] = []
         self._number = 0
         self._step()
@@ -158,7 +157,7 @@ class LiveFlight:
         return Poses(self.period.time, names, place, turn)
 
     def _step(self) -> None:
-        self.desired = self._reference(self._number)
+        self.desired = self._reference.at(self._number)
         try:
             with np.errstate(all="ignore"):
                 period = self._stepper.sense(self._number)
@@ -180,15 +179,6 @@ class LiveFlight:
 
     def _inner(self, *arguments: Any) -> Any:
         return self._law.inner(*arguments)  # of the law of now
-
-    def _reference(self, number: int) -> DesiredMotion:
-        if self._references is None or number - self._references[0] >= _AHEAD:
-            count = min(_AHEAD, self._last + 1 - number)
-            periods = np.arange(number, number + count, dtype=float)
-            times = periods * self.assembly.scenario.rates.control
-            self._references = number, reference_at(self.assembly.reference, times)
-        first, rows = self._references
-        return type(rows)(*(row[number - first] for row in rows))
 
     def _set_phases(self, phases: dict[tuple[str, str], float]) -> None:
         memory = self._stepper.memory

@@ -1,4 +1,4 @@
-"""The desired motion of an environment, control period by control period."""
+"""The desired motion of what is flown control period by control period."""
 
 from functools import lru_cache
 
