@@ -62,7 +62,7 @@ ROOMS = {
     "terminal": "compiling errors log scenario",
     "conversion": "attitude contract errors log plotting rendering",
     "validation": "actuators attitude contract environment log plotting runner scenario vehicle",
-    "view": "attitude contract errors log plotting rendering reporting simulation",
+    "view": "attitude contract errors log plotting rendering reporting simulation vehicle",
     "cli": (
         "campaign compiling conversion errors interrupts log plotting rendering runner scenario "
         "simulation terminal validation view"

@@ -65,8 +65,8 @@ def layout(
     ],
 ) -> None:
     """Write the panels of what flew in a log, for import in Foxglove or Lichtblick."""
-    from mjspace.conversion.shown import bus_of
     from mjspace.log import foxglove_layout
+    from mjspace.log.frames import bus_of
 
     opened = open_log(log)
     if output.suffix != ".json":

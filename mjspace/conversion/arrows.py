@@ -9,16 +9,13 @@ import numpy as np
 from mjspace.attitude import conjugate, rotate
 from mjspace.contract import Array
 from mjspace.conversion.shown import Frames
-from mjspace.log.arrows import ARROWS
+from mjspace.log.arrows import ARROWS, THRUST
 from mjspace.log.flown_scenario import scenario_of
 from mjspace.log.reader import Log
+from mjspace.rendering.arrows import ENGINE
 from mjspace.rendering.flown_model import flown_model
 
 _PERIOD = 0.05  # s between arrows, at least: 20 Hz
-_ENGINE = "engine_thrust"
-
-
-_THRUST = (255, 115, 25)
 
 
 class Arrows(NamedTuple):
@@ -76,7 +73,7 @@ def _thrusts(log: Log, frames: Mapping[str, Frames], bus: str, every: int) -> It
         return
     model = flown_model(log, scenario_of(log))
     sites = np.flatnonzero(model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_SITE)).tolist()
-    sites.sort(key=lambda motor: model.actuator(motor).name != _ENGINE)  # /truth has it first
+    sites.sort(key=lambda motor: model.actuator(motor).name != ENGINE)  # /truth has it first
     rows = log.read("/truth", ["thrust"], every=_stride(log, "/truth", every))
     shape = len(rows["time"]), count, 3
     origin, vector = np.zeros(shape), np.zeros(shape)
@@ -90,7 +87,7 @@ def _thrusts(log: Log, frames: Mapping[str, Frames], bus: str, every: int) -> It
         origin[:, k] = rotate(back, place - frames[bus].position[here])
         push = rotate(back, rotate(turn, along / np.linalg.norm(along)))
         vector[:, k] = rows["thrust"][:, k, None] * push
-    yield Arrows("thrust", _THRUST, rows["time"], origin, vector)
+    yield Arrows("thrust", THRUST, rows["time"], origin, vector)
 
 
 def _pushing(arrows: Arrows) -> Arrows:

@@ -11,9 +11,10 @@ from mjspace.attitude import rotate
 from mjspace.contract import Array
 from mjspace.conversion.arrows import Arrows, arrows_of
 from mjspace.conversion.rerun_layout import FOLLOW, WORLD, blueprint
-from mjspace.conversion.shown import Frames, bus_of, extent, frames_of, shapes_of
+from mjspace.conversion.shown import Frames, extent, frames_of, shapes_of
 from mjspace.errors import missing
 from mjspace.log.columns import Signal, blocks
+from mjspace.log.frames import bus_of
 from mjspace.log.reader import Log
 from mjspace.plotting.style import COLORS
 

@@ -10,7 +10,6 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from mjspace.contract import Array
 from mjspace.log.frames import parsed, poses_of
 from mjspace.log.reader import Log
-from mjspace.log.scene import REFERENCE
 
 
 class Frames(NamedTuple):
@@ -48,28 +47,6 @@ def frames_of(log: Log) -> Mapping[str, Frames]:
             rows.setdefault(name, []).append((found.time, *place, *turn))
     numbers = {name: np.array(found) for name, found in rows.items()}
     return {name: Frames(n[:, 0], n[:, 1:4], n[:, 4:]) for name, n in numbers.items()}
-
-
-def bus_of(log: Log) -> str:
-    """Return the name of the bus's frame: the one that is where /truth begins; "world" of none.
-
-    Raises:
-        InputError: the log is damaged.
-    """
-    truth = next(log.blocks("/truth", ["position", "attitude"]), None)
-    for record in log.records("/tf"):
-        found = poses_of(log.path, record)
-        places = {
-            name: np.concatenate([place, turn])
-            for name, place, turn in zip(*found[1:], strict=True)
-            if name != REFERENCE
-        }
-        if truth is None:
-            return str(next(iter(places), "world"))
-        begin: Array = np.concatenate([truth["position"][0], truth["attitude"][0]])
-        away = {name: float(np.abs(place - begin).max()) for name, place in places.items()}
-        return str(min(away, key=away.__getitem__))
-    return "world"
 
 
 def extent(shapes: Mapping[str, Any], frames: Mapping[str, Frames], bus: str) -> float:

@@ -10,8 +10,9 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from mjspace.contract import Array
 from mjspace.conversion.arrows import Arrows, arrows_of
-from mjspace.conversion.shown import bus_of, extent, frames_of, shapes_of
+from mjspace.conversion.shown import extent, frames_of, shapes_of
 from mjspace.log.copy import copy_with
+from mjspace.log.frames import bus_of
 from mjspace.log.reader import Log
 from mjspace.rendering.render import frames_at
 from mjspace.rendering.video import access_units

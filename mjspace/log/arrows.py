@@ -24,7 +24,18 @@ ARROWS = (
 )
 
 
-def color_of(name: str) -> tuple[float, float, float]:
-    """Return red, green and blue of the arrow of that name, 0 to 1."""
-    (red, green, blue) = next(arrow.color for arrow in ARROWS if arrow.name == name)
+THRUST = (255, 115, 25)
+"""Of the arrows of thrusts, which act elsewhere: red, green and blue, 0 to 255."""
+TRAIL = (255, 200, 60)
+"""Of the trail of where the vehicle was."""
+
+
+def color_of(name: str) -> tuple[int, int, int]:
+    """Return red, green and blue of the arrow of that name, 0 to 255."""
+    return next(arrow.color for arrow in ARROWS if arrow.name == name)
+
+
+def to_one(color: tuple[int, int, int]) -> tuple[float, float, float]:
+    """Return red, green and blue from 0 to 1."""
+    red, green, blue = color
     return red / 255.0, green / 255.0, blue / 255.0

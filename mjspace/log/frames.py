@@ -15,6 +15,8 @@ from mjspace.errors import InputError
 from mjspace.log.content import read_content
 from mjspace.log.encoding import HEADER
 from mjspace.log.index import ChunkPlace, inventory
+from mjspace.log.reader import Log
+from mjspace.log.scene import REFERENCE
 
 _TIME = HEADER.fields["log_time"][1]  # type: ignore[index]
 
@@ -61,6 +63,28 @@ def parsed(path: Path, topic: str, kind: Any, record: bytes) -> Any:
 def _stamp(record: bytes) -> int:
     """Return the time of a Message record [ns]."""
     return int.from_bytes(record[_TIME : _TIME + 8], "little")
+
+
+def bus_of(log: Log) -> str:
+    """Return the name of the bus's frame: the one that is where /truth begins; "world" of none.
+
+    Raises:
+        InputError: the log is damaged.
+    """
+    truth = next(log.blocks("/truth", ["position", "attitude"]), None)
+    for record in log.records("/tf"):
+        found = poses_of(log.path, record)
+        places = {
+            name: np.concatenate([place, turn])
+            for name, place, turn in zip(*found[1:], strict=True)
+            if name != REFERENCE
+        }
+        if truth is None:
+            return str(next(iter(places), "world"))
+        begin: Array = np.concatenate([truth["position"][0], truth["attitude"][0]])
+        away = {name: float(np.abs(place - begin).max()) for name, place in places.items()}
+        return str(min(away, key=away.__getitem__))
+    return "world"
 
 
 class Frames:

@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.log.arrows import color_of
+from mjspace.log import arrows as viewers
+from mjspace.log.arrows import color_of, to_one
 from mjspace.log.reader import Log
 from mjspace.rendering.captions import TURNING, flies_a_path
 from mjspace.rendering.plume import PLUME
@@ -19,8 +20,6 @@ AXES = 3
 """The geom group of a model's body axes: no part of the vehicle, but drawn."""
 ENGINE = "engine_thrust"
 """The motor of an engine, at a site along which it pushes."""
-YELLOW = (1.0, 0.78, 0.24)
-"""Of the trail and the velocity along it."""
 _AXIS = re.compile("axis_[xyz]$")
 _PREFIXES = (("", 1.0), ("m", 1e-3), ("u", 1e-6), ("n", 1e-9))
 _OF_AXES, _OF_HULL = 2.0, 1.2  # the longest arrow, over the body axes, or over what has none
@@ -49,16 +48,18 @@ class Kind(NamedTuple):
 _TORQUE = (("/command", "torque"), ("/law", "torque"))
 _MOMENTUM, _RATE = (("/truth", "momentum"),), (("/truth", "rate"),)
 _VELOCITY, _THRUST = (("/truth", "velocity"),), (("/truth", "thrust"),)
-TORQUE = Kind("torque", "τ", _TORQUE, "body", "N m", color_of("commanded torque"), 1e-9)
-MOMENTUM = Kind("momentum", "H", _MOMENTUM, "world", "N m s", color_of("total momentum"), 1e-9)
+TORQUE = Kind("torque", "τ", _TORQUE, "body", "N m", to_one(color_of("commanded torque")), 1e-9)
+MOMENTUM = Kind(
+    "momentum", "H", _MOMENTUM, "world", "N m s", to_one(color_of("total momentum")), 1e-9
+)
 # Shorter, so that it does not end where the momentum does when it is along that.
 RATE = Kind(
-    *("rate", "ω", _RATE, "body", "deg/s", color_of("angular velocity"), 1e-6),
+    *("rate", "ω", _RATE, "body", "deg/s", to_one(color_of("angular velocity")), 1e-6),
     shown=float(np.degrees(1.0)),
     share=0.7,
 )
-VELOCITY = Kind("velocity", "v", _VELOCITY, "world", "m/s", YELLOW, 1e-4)
-THRUST = Kind("thrust", "F", _THRUST, "engine", "N", (1.0, 0.45, 0.1), 1e-3)
+VELOCITY = Kind("velocity", "v", _VELOCITY, "world", "m/s", to_one(viewers.TRAIL), 1e-4)
+THRUST = Kind("thrust", "F", _THRUST, "engine", "N", to_one(viewers.THRUST), 1e-3)
 
 
 class Arrows(NamedTuple):

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from mjspace.contract import Array
-from mjspace.rendering.arrows import YELLOW
+from mjspace.log.arrows import TRAIL, to_one
 
 MOST_GEOMS = 400
 """That the functions here add to a scene, together."""
@@ -59,7 +59,7 @@ def axis_letter(origin: Array, axis: Array, length: float, name: str, color: Any
 def add_trail(scene: Any, points: Array) -> None:
     """Add a line through points (n, 3) [m]."""
     for start, end in pairwise(points):
-        _connect(scene, _LINE, 2.0, start, end, YELLOW)
+        _connect(scene, _LINE, 2.0, start, end, to_one(TRAIL))
 
 
 def add_site(scene: Any, place: Array) -> list[Letter]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mjspace.contract import Array
 from mjspace.log.flown_scenario import scenario_of
+from mjspace.log.frames import bus_of
 from mjspace.log.reader import Log
 from mjspace.reporting import page
 from mjspace.reporting.flight_charts import flight_charts
@@ -55,7 +56,7 @@ def _recorded(log: Log, times: Array, speed: float, progress: Callable[[float], 
     moments = Moments(log)
     # Nobody connects: viser records what a server would send.
     with serving(LOOPBACK, 0, "mjspace") as (server, _):
-        scene = Scene(server, bodies(moments.frames.scene()))
+        scene = Scene(server, bodies(moments.frames.scene()), bus_of(log))
         scene.longest, scene.path = moments.survey(scene.size)
         scene.show(moments.at(float(times[0])), log.end)
         recording = server.get_scene_serializer()

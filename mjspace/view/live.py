@@ -14,6 +14,7 @@ from mjspace.contract import Array
 from mjspace.errors import printable
 from mjspace.log.scene import scene as geometry
 from mjspace.simulation.live_flight import BROKEN, LiveFlight
+from mjspace.vehicle.indices import bus_id
 from mjspace.view.controls import FRAME, PLOTS, SPEEDS, add_display, keep_showing
 from mjspace.view.history import History
 from mjspace.view.scene import Moment, Scene
@@ -46,7 +47,9 @@ class Live:
         self._changed = Event()
         self._gui = server.gui
         model = self.flight.assembly.vehicle.model
-        self.scene = Scene(server, bodies(scene_update(geometry(model).update)))
+        self.scene = Scene(
+            server, bodies(scene_update(geometry(model).update)), model.body(bus_id(model)).name
+        )
         self._debt, self._plotted, self._shown = 0.0, 0.0, -1
         self._add_controls()
         self._history = History(self._gui, self.flight)

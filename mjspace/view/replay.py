@@ -6,6 +6,7 @@ from threading import Event, Thread
 from typing import Any
 
 from mjspace.errors import InputError
+from mjspace.log.frames import bus_of
 from mjspace.log.reader import Log
 from mjspace.plotting.panels import Curves, curves
 from mjspace.view import plots
@@ -35,7 +36,7 @@ class Replay:
         self._server, self._log = server, log
         self._moments = Moments(log)
         drawn = bodies(self._moments.frames.scene())
-        self.scene = Scene(server, drawn)
+        self.scene = Scene(server, drawn, bus_of(log))
         self.time, self.playing, self.speed = log.start, False, 1.0
         self.surveyed, self._changed = Event(), Event()
         self._plots: list[plots.Plot] = []

@@ -7,14 +7,13 @@ import numpy as np
 
 from mjspace import attitude
 from mjspace.contract import Array
-from mjspace.log.arrows import ARROWS, Arrow
+from mjspace.log.arrows import ARROWS, TRAIL, Arrow
 from mjspace.log.frames import Poses
 from mjspace.view.shapes import Body
 
 FOLLOWS = ("the spacecraft", "the spacecraft, turning with it", "nothing")
 """What the camera follows."""
 _AXES = ((242, 64, 51), (77, 217, 77), (77, 128, 255))  # x, y, z
-_TRAIL = (255, 200, 60)
 _STILL = 0.5  # of the vehicle's radius: what moves less leaves the trail of its x axis
 
 
@@ -40,8 +39,8 @@ class Scene:
         follow: what the camera follows, one of ``FOLLOWS``.
     """
 
-    def __init__(self, server: Any, drawn: Sequence[Body]) -> None:
-        """Draw the bodies, at their origins until ``show``."""
+    def __init__(self, server: Any, drawn: Sequence[Body], bus: str) -> None:
+        """Draw the bodies, of which the spacecraft's is the ``bus``, at their origins."""
         self._server, scene = server, server.scene
         self.longest: dict[str, float] = {}
         self.path: tuple[Array, Array] = np.empty(0), np.empty((0, 3))
@@ -66,7 +65,7 @@ class Scene:
                     flat_shading=True,
                     cast_shadow=False,
                 )
-        self._own = _own(drawn)
+        self._own = bus
         self._axes = self._frame("/flight/axes", 1.1, 0.02, 0)
         self._desired = self._frame("/flight/desired", 1.3, 0.008, 110)
         self._arrows = {arrow.name: self._arrow(arrow) for arrow in ARROWS}
@@ -157,7 +156,7 @@ class Scene:
         if visible and flown != self._flown:
             points = self.path[1][:flown]
             self._line.points = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-            self._line.colors = np.broadcast_to(_TRAIL, (flown - 1, 2, 3)).astype(np.uint8)
+            self._line.colors = np.broadcast_to(TRAIL, (flown - 1, 2, 3)).astype(np.uint8)
             self._flown = flown
         self._line.visible = visible
 
@@ -165,7 +164,7 @@ class Scene:
         return self._server.scene.add_line_segments(
             "/flight/trail",
             np.zeros((1, 2, 3), np.float32),
-            _TRAIL,
+            TRAIL,
             thickness=2.0,
             thickness_units="screen",
             visible=False,
@@ -181,11 +180,6 @@ def trail(time: Array, position: Array, quaternion: Array, size: float) -> tuple
     if reach > _STILL * size:
         return time, position
     return time, position + attitude.rotate(quaternion, np.array([1.1 * size, 0.0, 0.0]))
-
-
-def _own(drawn: Sequence[Body]) -> str:
-    """Return the name of the bus: the first body that is not the world."""
-    return next((body.name for body in drawn if body.name != "world"), "")
 
 
 def _move(node: Any, place: Array, turn: Array) -> None:

@@ -11,8 +11,8 @@ import pytest
 
 from mjspace.cli import app
 from mjspace.conversion.convert import convert
-from mjspace.conversion.shown import bus_of
 from mjspace.errors import InputError
+from mjspace.log.frames import bus_of
 from mjspace.log.reader import Log
 from mjspace.runner.run import run
 
